@@ -30,7 +30,7 @@ from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools.architecture import ring_rows
 from tools.frame_faults import FAULT_TEXTS, TRUST_TEXTS
 from tools.marks import marked, with_sections
-from tools.reactions import reaction_rows
+from tools.reactions import claim_rows, reaction_rows
 
 Key = TypeVar("Key", bound=IntEnum)
 ROOT = Path(__file__).parents[1]
@@ -244,6 +244,7 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "reasons": lambda: reason_rows(Reason, REASON_TEXTS),
     "faults": fault_rows,
     "reactions": reaction_rows,
+    "tests": claim_rows,
     "filters": lambda: filter_table(KINDS.values()),
     "checksums": checksum_table,
     "e2e profiles": profile_rows,

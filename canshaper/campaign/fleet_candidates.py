@@ -17,7 +17,7 @@ from canshaper.config.limits import Sway
 from canshaper.edit.edit import Change, change
 from canshaper.errors import DesignError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 from canshaper.report.console import new_table
 from canshaper.shaping.sway import GRAVITY_M_S2
 

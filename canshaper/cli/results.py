@@ -117,22 +117,18 @@ class Results(SafeConsole):
         after: Sequence[str] = (),
         code: int = 0,
     ) -> None:
-        """End a verb that measured or designed: results, picture, what follows, exit code.
-
-        What the verb writes into the deployment file is written before: the reader of its output
-        may end at any line.
+        """End a verb that measured or designed; it has written into the deployment file before.
 
         Args:
             show: prints the results.
             figure: draws their picture; None where there is nothing to draw.
-            path: file of the picture without --picture; None for only in the report.
-            data: of ``--json``, by the file of the picture; None where JSON is not asked for.
+            path: as of ``picture``.
+            data: of ``--json``, by the file of the picture; None without that option.
             after: lines on what was written, and what to do next.
             code: exit code.
 
         Raises:
             typer.Exit: the exit code is not 0.
-            OSError: picture or report cannot be written.
         """
         show(self)
         drawn = self.picture(path, figure) if figure else None

@@ -38,12 +38,12 @@ def status(path: Path) -> dict[str, Any]:
 
 
 def person() -> str:
-    """Name of who runs this program, also by sudo."""
+    """Return the name of the person who runs this program, also by sudo."""
     return os.environ.get("SUDO_USER") or getpass.getuser()
 
 
 def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
-    """Change numbers of a running daemon, all or none, until it ends or reads its file again.
+    """Change numbers of a running daemon, all or none; they hold until it ends or reads its file.
 
     Args:
         path: its control socket.

@@ -10,7 +10,7 @@ from canshaper.design.tuning.verdict import verdicts
 from canshaper.errors import Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import unfit
-from canshaper.machine.stopping import rehearsed, unstated
+from canshaper.machine.stop_distance import rehearsed, unstated
 from canshaper.machine.valves import BoundAxis
 
 # Full deflection, part of the DBC range of a joystick; ratio of two speeds of one crane; radius of

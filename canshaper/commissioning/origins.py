@@ -14,19 +14,11 @@ from canshaper.config.load import load_config
 from canshaper.config.schema import AxisSection, DeploymentConfig
 from canshaper.config.section import Origin, Section, sections
 from canshaper.config.source import Place
-from canshaper.edit.edit import (
-    Change,
-    FileValue,
-    change,
-    note,
-    of_limits,
-    sections_of,
-    written_by,
-)
+from canshaper.edit.edit import Change, FileValue, change, note, of_limits, sections_of, written_by
 from canshaper.errors import CutOffError, UsageError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 from canshaper.machine.used_message import key_path
 from canshaper.recording.log import LogFile
 from canshaper.recording.tables import is_table

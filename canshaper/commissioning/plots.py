@@ -4,6 +4,7 @@ Drawn through the object API of matplotlib, like ``canshaper.report.plot``.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -24,12 +25,12 @@ _DATA = "#8A8A8A"
 
 
 def in_file(limits: OutputLimits, commands_pct: Sequence[float]) -> list[float]:
-    """Speed in % of full that the file expects at commands in %."""
+    """Return the speeds in % of full that the file expects at commands in %."""
     return [100.0 * limits.velocity(c / 100.0) for c in commands_pct]
 
 
 def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: float) -> Figure:
-    """Speed over command.
+    """Draw speed over command of a valve: by the file, and as measured.
 
     Args:
         axis: its name.
@@ -44,30 +45,14 @@ def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: fl
     style.plain(panel, size=style.TEXT_PT)
     style.zero_line(panel)
     panel.axvspan(-top_pct, top_pct, color="#EFEFEF", linewidth=0, zorder=0, label="driven")
-    panel.plot(
-        fine,
-        in_file(limits, fine),
-        color=style.RAW_COLOUR,
-        linewidth=1.2,
-        linestyle=style.DASHED,
-        label="file",
-        zorder=3,
-    )
+    dashed: dict[str, Any] = {"color": style.RAW_COLOUR, "linestyle": style.DASHED, "zorder": 3}
+    panel.plot(fine, in_file(limits, fine), linewidth=1.2, label="file", **dashed)
+    line: dict[str, Any] = {"color": style.SHAPED_COLOUR, "linewidth": 1.8}
     driven = slice(None)
     if top_pct < 100.0 * FULL:  # what was not driven is a straight line
         driven = slice(1, -1)
-        panel.plot(
-            commands, speeds, ":", color=style.SHAPED_COLOUR, linewidth=1.8, label="not measured"
-        )
-    panel.plot(
-        commands[driven],
-        speeds[driven],
-        "-o",
-        color=style.SHAPED_COLOUR,
-        linewidth=1.8,
-        markersize=4,
-        label="measured",
-    )
+        panel.plot(commands, speeds, ":", label="not measured", **line)
+    panel.plot(commands[driven], speeds[driven], "-o", markersize=4, label="measured", **line)
     for one, sign, place in ((measured.negative, -1, "right"), (measured.positive, 1, "left")):
         side = style.MINUS if sign < 0 else ""
         panel.annotate(
@@ -90,7 +75,7 @@ def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: fl
 
 
 def of_runs(runs: Mapping[str, Run], tick_ms: float) -> Figure:
-    """Share of the ticks by their lateness, a bar for each run, and the limit of one tick.
+    """Draw the share of ticks by their lateness, a bar for each run, and the limit of a tick.
 
     Args:
         runs: by their names.
@@ -135,15 +120,12 @@ def _time(us: int) -> str:
 
 
 def of_sensors(findings: Sequence[SensorFinding]) -> Figure:
-    """Measured over model, a row a finding with a fit."""
+    """Draw measurements and model over time, a row for each finding with a fit."""
     rows = [finding for finding in findings if finding.fit]
     height = _TOP_PX + _ROW_PX * len(rows) + _FOOT_PX
     fig = style.print_figure(height)
-    words = [
-        ("measured", _DATA),
-        ("model", style.SHAPED_COLOUR),
-        ("command", style.JOYSTICK_COLOUR),
-    ]
+    looks = _DATA, style.SHAPED_COLOUR, style.JOYSTICK_COLOUR
+    words = [*zip(("measured", "model", "command"), looks, strict=True)]
     style.coloured_words(fig, words, (0.012, 1.0 - 14 / height), size=style.TITLE_PT, sep=18)
     grid = fig.add_gridspec(
         len(rows), 1, left=0.085, right=0.985, top=1.0 - _TOP_PX / height, bottom=_FOOT_PX / height,
@@ -162,13 +144,7 @@ def of_sensors(findings: Sequence[SensorFinding]) -> Figure:
             panel.plot(time, np.degrees(model), color=style.SHAPED_COLOUR, linewidth=1.8)
             reach = max(reach, float(np.degrees(np.abs(one.value)).max()))
         for one in finding.data:
-            command = one.command
-            panel.step(
-                command.time_s,
-                reach * command.speed,
-                where="post",
-                color=style.JOYSTICK_COLOUR,
-                zorder=1,
-            )
+            command, grey = one.command, style.JOYSTICK_COLOUR
+            panel.step(command.time_s, reach * command.speed, where="post", color=grey, zorder=1)
         style.label(panel, "time in s", f"swing, {finding.unit}")
     return fig

@@ -9,11 +9,7 @@ from canshaper.commissioning.robust_task import RobustTask, between, following, 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.limits import Sway
 from canshaper.design.profiles import swinging_axis
-from canshaper.design.tuning.evaluate import (
-    LENGTHS_PCT,
-    Evaluation,
-    evaluate,
-)
+from canshaper.design.tuning.evaluate import LENGTHS_PCT, Evaluation, evaluate
 from canshaper.design.tuning.formulation import check_swing
 from canshaper.design.tuning.robust import LEAST_TAP, RobustShaper, least_residual, shortest
 from canshaper.design.tuning.verdict import GOOD, Verdict, judge
@@ -56,7 +52,7 @@ class RobustDesign:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether it damps over its range, and otherwise a longer one that does."""
+        """Verdict on the shaper over its lengths; it names a longer one that is good."""
         task, shaper = self.task, self.shaper
         setup = task.mode, task.tick_s, task.in_file(shaper), task.machine_of(shaper)
         verdict = judge(*setup, task.range_pct)

@@ -22,7 +22,7 @@ from canshaper.controller.axis_control import AxisControl
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import at_ends
-from canshaper.machine.stopping import (
+from canshaper.machine.stop_distance import (
     FullSpeed,
     allowed_s,
     full_speed,

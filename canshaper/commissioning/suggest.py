@@ -9,7 +9,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.signals import LEAST_STEPS, command_fault, raw_limits, symmetrical_range
-from canshaper.codec.status import AIM, AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
+from canshaper.codec.status import AIM, AXIS_STATUS, required_names
 from canshaper.machine.corrections import bit_of
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, UNITS
 from canshaper.machine.used_message import ENABLE as CONTRARY_ENABLE
@@ -48,7 +48,7 @@ def velocities(message: Message) -> list[Signal]:
 
 
 def two_sided(signal: Signal) -> bool:
-    """Whether a signal may be a velocity that goes both ways."""
+    """Return whether a signal may be a velocity that goes both ways."""
     if not signal.scale:
         return False
     low, high = reach(signal)
@@ -252,7 +252,7 @@ def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Mess
 
 
 def is_status(message: Message) -> bool:
-    """Whether a message carries the status of an axis, or the aim point of a crane."""
+    """Return whether a message carries the status of an axis, or the aim point of a crane."""
     names = {signal.name for signal in message.signals}
     return names >= required_names(AXIS_STATUS) or names >= required_names(AIM)
 
@@ -264,17 +264,7 @@ def status_of(messages: Sequence[Message], axis: str) -> Message | None:
     return likely if likely and likeness(likely.name, axis) >= LIKELY else None
 
 
-def service_status(messages: Sequence[Message]) -> Message | None:
-    """Return the message with the counters of the service; None for none."""
-    return _with(required_names(SERVICE_STATUS), messages)
-
-
-def identity(messages: Sequence[Message]) -> Message | None:
-    """Return the message with the digest of what runs; None for none."""
-    return _with(required_names(IDENTITY), messages)
-
-
-def _with(signals: set[str], messages: Sequence[Message]) -> Message | None:
+def with_signals(signals: set[str], messages: Sequence[Message]) -> Message | None:
     """Return the first message with all these signals; None for none."""
     return next((m for m in messages if {s.name for s in m.signals} >= signals), None)
 

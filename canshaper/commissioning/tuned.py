@@ -91,7 +91,7 @@ def design_tuned(
     starts: int = 3,
     report: Callable[[float, str], None] = lambda _done, _what: None,
 ) -> TunedDesign:
-    """Tune an axis.
+    """Tune the G_FF of an axis.
 
     Args:
         deployment: the machine.
@@ -155,7 +155,7 @@ def design_tuned(
 
 
 def _asked(bound: BoundAxis, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Complete the options: by those that tuned the filter in the file, else by the defaults."""
+    """Return the options, completed by those of the filter in the file, else by defaults."""
     named = [aim for aim in _AIMS if aim & given.keys()]
     if len(named) > 1:
         raise UsageError("expected one of --preference, --length-range and weights, got several")

@@ -257,11 +257,15 @@ class Diagnostics:
         """Add a problem at a place of the deployment file."""
         self.problems.append(self._source.problem(place, text))
 
-    def check_axis(self, place: Place, name: str, axes: Collection[str]) -> bool:
-        """Return whether an axis has this name; add a problem where none has."""
-        if name not in axes:
-            self.add(place, f"expected an axis, got {name!r}; there are {', '.join(axes)}")
-        return name in axes
+    def check_name(self, place: Place, what: str, name: str, names: Collection[str]) -> bool:
+        """Return whether a name is one of these; else add a problem that lists them.
+
+        ``what`` is the thing that has to have such a name, such as "an axis".
+        """
+        if name not in names:
+            there = ", ".join(names) or "none"
+            self.add(place, f"expected {what}, got {name!r}; there are {there}")
+        return name in names
 
     def check_same(
         self, place: Place, section: object, keys: Iterable[str], other: object, text: str

@@ -10,7 +10,7 @@ from canshaper.config.schema import AxisSection
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
 from canshaper.machine.filters import filter_fault
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 
 # Most numbers in one request: each axis that changes takes about 40 us of the loop.
 MOST_NUMBERS = 16

@@ -9,7 +9,7 @@ from canshaper.config.schema import AxisSection
 from canshaper.inputs.joystick import CommandSource
 from canshaper.inputs.stops import EmergencyStopInput, StopCauses
 from canshaper.inputs.value import Feedback, ProfileChoice, Value
-from canshaper.machine.stopping import output_limits
+from canshaper.machine.stop_distance import output_limits
 from canshaper.machine.valves import BoundAxis
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.demand_bounds import RunOn

@@ -10,7 +10,7 @@ from canshaper.machine.filters import check_filters
 from canshaper.machine.identity import bind_status
 from canshaper.machine.inputs import bind_ends, bind_feedback, bind_rope, bind_status_word
 from canshaper.machine.lookup import Lookup
-from canshaper.machine.stopping import stated_fault
+from canshaper.machine.stop_distance import stated_fault
 from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 
@@ -42,10 +42,10 @@ def _bind_axis(
     place: Place = ("axes", name)
     add, problems = lookup.diagnostics.add, lookup.diagnostics.problems
     before, joystick = len(problems), axis.command.joystick
-    if joystick not in lookup.config.joysticks:
-        names = ", ".join(lookup.config.joysticks)
-        text = f"expected a joystick, got {joystick!r}; there are {names}"
-        add((*place, "command", "joystick"), text)
+    joysticks = lookup.config.joysticks
+    lookup.diagnostics.check_name(
+        (*place, "command", "joystick"), "a joystick", joystick, joysticks
+    )
     valve = bind_valve(lookup, shared_valves, (*place, "valve"), axis.valve, axis.command)
     status, status_ticks = bind_status(lookup, (*place, "status"), axis.status, AXIS_STATUS)
     if valve is None or len(problems) > before:

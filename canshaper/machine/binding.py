@@ -119,7 +119,7 @@ def _check_crane(lookup: Lookup) -> None:
     crane, taken = lookup.config.crane, dict[str, str]()
     for key, name in crane.moved.items() if crane else ():
         place = ("crane", key)
-        if lookup.diagnostics.check_axis(place, name, lookup.config.axes):
+        if lookup.diagnostics.check_name(place, "an axis", name, lookup.config.axes):
             if name in taken:
                 text = f"expected an axis of its own, got {name!r}, that of {taken[name]}"
                 lookup.diagnostics.add(place, text)
@@ -135,7 +135,7 @@ def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None
     check_profiles(diagnostics, config)
     check_control(diagnostics, config)
     for name in config.hydraulics.shares if config.hydraulics else ():
-        diagnostics.check_axis(("hydraulics", "shares", name), name, config.axes)
+        diagnostics.check_name(("hydraulics", "shares", name), "an axis", name, config.axes)
 
 
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:

@@ -190,9 +190,7 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[SentMessage]) -
     """
     add, buses = lookup.diagnostics.add, lookup.config.buses
     for i, bus in enumerate(gateway.between):
-        if bus not in buses:
-            names = ", ".join(buses)
-            add(("gateway", "between", i), f"expected a bus, got {bus!r}; there are {names}")
+        lookup.diagnostics.check_name(("gateway", "between", i), "a bus", bus, buses)
     fd = [buses[bus].fd for bus in gateway.between if bus in buses]
     if len({*fd}) > 1:
         add(("gateway", "between"), "expected fd: true of both buses or of none, got it of one")

@@ -70,7 +70,7 @@ def _check_axis(
         return
     add, axes = lookup.diagnostics.add, lookup.config.axes
     at = ".".join(str(part) for part in place)
-    if not lookup.diagnostics.check_axis(place, name, axes):
+    if not lookup.diagnostics.check_name(place, "an axis", name, axes):
         return
     if name in moved:
         add(place, f"expected an axis that is in no other motion, got {name!r} of {moved[name]}")

@@ -157,7 +157,7 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         key = Key.parsed(text)
         if key is None:
             add(place, "expected axes.AXIS.SECTION.NAME, got no key of an axis")
-        elif diagnostics.check_axis(place, key.axis, config.axes):
+        elif diagnostics.check_name(place, "an axis", key.axis, config.axes):
             for fault in faults(key, config.axes[key.axis], low, high):
                 add(place, fault)
             if slow and key.name == "max_pct" and high > REDUCED_PCT:

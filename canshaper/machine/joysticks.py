@@ -90,15 +90,13 @@ def check_conditions(lookup: Lookup) -> None:
     for name, section in config.joysticks.items():
         if (of := section.enable_of) is not None:
             names = [n for n, one in config.joysticks.items() if one.enable is not None]
-            if of not in names:
-                text = f"expected a joystick with enable, got {of!r}; there are {', '.join(names)}"
-                add(("joysticks", name, "enable_of"), text)
+            at: Place = ("joysticks", name, "enable_of")
+            lookup.diagnostics.check_name(at, "a joystick with enable", of, names)
         for i, text in enumerate(section.enable or ()):
             joystick, dot, _ = text.partition(".")
             place = _place(section.enable, name, i)
-            if dot and joystick not in config.joysticks:
-                names = list(config.joysticks)
-                add(place, f"expected a joystick, got {joystick!r}; there are {', '.join(names)}")
+            if dot:
+                lookup.diagnostics.check_name(place, "a joystick", joystick, config.joysticks)
             if text in (section.enable or ())[:i]:
                 add(place, f"expected each switch once, got {text!r} again")
 
@@ -272,10 +270,8 @@ def check_following(
     if config.tick is None:
         return
     name, place = config.tick.follow, ("tick", "follow")
-    if name not in config.joysticks:
-        names = ", ".join(config.joysticks)
-        diagnostics.add(place, f"expected a joystick, got {name!r}; there are {names}")
-    elif (joystick := joysticks[name]) and (fault := follow_fault(config, joystick)):
+    known = diagnostics.check_name(place, "a joystick", name, config.joysticks)
+    if known and (joystick := joysticks[name]) and (fault := follow_fault(config, joystick)):
         diagnostics.add(place, f"{fault} of {name}")
 
 

@@ -68,11 +68,7 @@ class Lookup:
             The message, or None where no DBC file has it.
         """
         add, bus, name = self.diagnostics.add, config.bus, config.message
-        if bus not in self.config.buses:
-            add(
-                (*place, "bus"),
-                f"expected a bus, got {bus!r}; there are {', '.join(self.config.buses)}",
-            )
+        self.diagnostics.check_name((*place, "bus"), "a bus", bus, self.config.buses)
         result = self.messages.find(name)
         if isinstance(result, str):
             add((*place, "message"), result)
@@ -160,10 +156,8 @@ class Lookup:
         """Check that the bus has a CANopen node of this name, if one is named."""
         config = self.config.buses.get(bus)
         nodes = config.canopen.nodes if config and config.canopen else {}
-        if name is not None and name not in nodes:
-            names = ", ".join(nodes) or "none"
-            text = f"expected a node of bus {bus}, got {name!r}; there are {names}"
-            self.diagnostics.add((*place, "node"), text)
+        if name is not None:
+            self.diagnostics.check_name((*place, "node"), f"a node of bus {bus}", name, nodes)
 
     def check_groups(self) -> None:
         """Check that no received message is in a J1939 group with which we command a valve."""

@@ -128,11 +128,6 @@ class Routing:
         return key in self.routes or group or key[1:] not in self.others
 
 
-def exact_inputs(inputs: Iterable[BoundInput]) -> dict[Key, BoundInput]:
-    """Return the inputs from a known source, by every id that their frames may have."""
-    return {key: bound for bound in inputs if not bound.any_source for key in bound.keys}
-
-
 def grouped_inputs(inputs: Iterable[BoundInput]) -> dict[tuple[str, int], tuple[BoundInput, ...]]:
     """Return the inputs that are received by their J1939 group, by bus and group."""
     groups: dict[tuple[str, int], tuple[BoundInput, ...]] = {}
@@ -176,7 +171,8 @@ def build_routing(
         routes |= dict.fromkeys(valves, Route(Role.VALVE))
     for name, bus in config.buses.items():
         routes.update(_node_routes(name, bus, listen_only))
-    routes |= {key: Route(Role.RECEIVED, bound) for key, bound in exact_inputs(inputs).items()}
+    known_source = (bound for bound in inputs if not bound.any_source)
+    routes |= {key: Route(Role.RECEIVED, bound) for bound in known_source for key in bound.keys}
     groups = _group_routes(config, inputs, () if listen_only else axes)
     used = {key[1:] for key, route in routes.items() if route.role not in (Role.CLAIM, Role.NODE)}
     ids, in_line = frozenset(known), config.gateway.between if config.gateway else ()

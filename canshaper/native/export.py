@@ -13,7 +13,7 @@ from canshaper.controller.controller import Controller
 from canshaper.errors import ConfigError, UsageError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
-from canshaper.machine.stopping import rehearsed_valves, unstated
+from canshaper.machine.stop_distance import rehearsed_valves, unstated
 from canshaper.native.drive import NAMES, Driven, Tick, play, random_drive, rows, valve_keys
 from canshaper.native.library import (
     C_FILES,

@@ -127,8 +127,7 @@ def mcap(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     except (McapError, ZstdError, *DAMAGED) as error:
         if not file.read(1):
             raise place.cut_off("its end is missing (mcap recover makes its index)") from None
-        got = f"{type(error).__name__} {error}".rstrip()
-        raise place.error(got, "an MCAP log that is whole") from None
+        raise place.error(_reason(error), "an MCAP log that is whole") from None
 
 
 def _frames(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:

@@ -18,7 +18,7 @@ from starlette.routing import BaseRoute, Route
 
 STATIC = Path(__file__).parent / "static"
 CONFLICT, NOT_FOUND = 409, 404
-COMMAND = (sys.executable, "-m", "canshaper.studio.rehearsal")
+COMMAND = (sys.executable, "-m", "canshaper.studio.commission_process")
 
 
 class Commission:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
@@ -46,7 +46,7 @@ def playback_app(file: str, choices: Sequence[Choice], access: Access) -> ASGIAp
     kept = _Kept(file, choices)
 
     def drives(_request: Request) -> Response:
-        return _json([choice.title for choice in choices])
+        return JSONResponse([choice.title for choice in choices])
 
     def drive(request: Request) -> Response:
         number = request.path_params["number"]
@@ -96,7 +96,3 @@ class _Kept:
             "sliders": {},
             **drawn_of(playback.parameters, playback.films[0].view.deployment),
         }
-
-
-def _json(content: object) -> Response:
-    return Response(json.dumps(content), media_type="application/json")

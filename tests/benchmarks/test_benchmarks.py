@@ -9,7 +9,7 @@ import pytest
 
 from canshaper.config.bus import Bus
 from canshaper.machine.binding import load_deployment
-from canshaper.machine.stopping import unstated
+from canshaper.machine.stop_distance import unstated
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = sorted(

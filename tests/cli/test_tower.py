@@ -67,10 +67,3 @@ def test_a_drive_has_a_rope_and_where_it_may_a_radius() -> None:
         assert ("radius_m" in drawn) is (file is TOWER)
         if file is TOWER:
             assert crane.tower.start_radius_m == drawn["radius_m"]
-
-
-@pytest.mark.parametrize(
-    ("file", "axes"), [(TOWER, "slew, near_far, hoist: its operator"), (BRIDGE, "bridge, trolley,")]
-)
-def test_work_is_not_done_with_a_rope(file: Path, axes: str) -> None:
-    assert f"expected axes slew and near_far, got {axes}" in run("work", str(file), code=2)

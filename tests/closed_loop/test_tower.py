@@ -50,9 +50,13 @@ def judged_m(recording: Recording, rope_m: float) -> float:
     return most
 
 
+def left(recording: Recording) -> float:
+    return swing_from(recording, END_S)
+
+
 def test_slew_and_trolley_are_one_motion_of_the_measured_rope() -> None:
     recording = driven(read(FILE), 40.0)
-    assert swing_from(recording, END_S) < 0.05
+    assert left(recording) < 0.05
     assert math.degrees(judged_m(recording, 30.0) / 30.0) < 0.15
 
 
@@ -62,9 +66,8 @@ def test_without_the_motion_more_is_left() -> None:
     deployment = read(FILE)
     config = deployment.config.model_copy(update={"motion": {}})
     apart = driven(replace(deployment, config=config, motions={}), 40.0)
-    left = swing_from(apart, END_S)
-    assert left > 1.0
-    assert math.degrees(judged_m(apart, 30.0) / 30.0) == pytest.approx(left, abs=0.3)
+    assert left(apart) > 1.0
+    assert math.degrees(judged_m(apart, 30.0) / 30.0) == pytest.approx(left(apart), abs=0.3)
 
 
 @pytest.mark.slow
@@ -97,4 +100,4 @@ def test_a_motion_may_have_one_axis_with_a_rope(tmp_path: Path) -> None:
     text = FILE.read_text(encoding="utf-8")
     radius = text[text.index("    radius: {") : text.index("    max_pct: 50")]
     path = machine_file(tmp_path, FILE, ("    near_far: trolley\n", ""), (radius, ""))
-    assert 0.2 < swing_from(driven(load_deployment(path), 40.0), END_S) < 2.5
+    assert 0.2 < left(driven(load_deployment(path), 40.0)) < 2.5

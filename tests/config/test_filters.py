@@ -16,7 +16,7 @@ from canshaper.errors import ConfigError
 from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.sway import SwayMode, SwayModel
-from tests.rigs.files import ROOT, Machine
+from tests.rigs.files import Machine
 from tests.rigs.residual import residual_left
 
 Load = Callable[[str], DeploymentConfig]
@@ -84,14 +84,8 @@ def test_the_json_schema_accepts_it(shipped: str, text: str, parameters: dict[st
 
 
 BAD = [
-    ("kind: gff, third_pole_rad_s: -4", "expected a1 and a2, or poles_rad_s, got neither"),
     ("kind: gff, a1: 0.42", "expected a1 and a2, or poles_rad_s, got a1"),
-    (
-        "kind: gff, poles_rad_s: [-4, -4], a1: 1",
-        "expected a1 and a2, or poles_rad_s, got a1, poles_rad_s",
-    ),
     ("kind: robust, tick_ms: 20, taps: []", "taps: expected 1 or more entries, got []"),
-    ("kind: robust, tick_ms: 20, taps: [0.5, 0.4]", "sum of the taps: expected 1, got 0.9"),
     ("kind: robust, tick_ms: 20, taps: [1.5, -0.5]", "taps.0: expected 0 to 1, got 1.5"),
 ]
 
@@ -115,17 +109,6 @@ def test_too_many_taps_are_one_problem(problems: Problems, shipped: str) -> None
     assert "taps: expected 1000 entries at most, got [0.000" in problem
 
 
-@pytest.mark.parametrize("kind", [k.name for k in KINDS.values() if k.needs_sway])
-def test_an_axis_without_sway_data_has_no_filter_that_needs_them(
-    problems: Problems, shipped: str, kind: str
-) -> None:
-    text = next(g[0] for g in GOOD if g[0].split(",")[0] == f"kind: {kind}")
-    assert LIFT in shipped
-    (problem,) = problems(shipped.replace(LIFT, f"filter: {{ {text} }}"))
-    assert "axes.lift" in problem
-    assert f"expected sway data for filter {kind}, got none" in problem
-
-
 # -- against the valve's period: canshaper check ---------------------------------------------------
 
 
@@ -147,43 +130,17 @@ def checked(directory: Path, text: str, *, sway: str = "") -> list[str]:
     return problems
 
 
-def test_taps_for_another_period_than_the_valves_are_refused(tmp_path: Path) -> None:
-    shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
-    line = shipped[: shipped.index(SLEW)].count("\n") + 1
-    assert checked(tmp_path, "kind: robust, tick_ms: 20, taps: [0.5, 0.5]") == [
-        f"machine.yaml:{line}: axes.slew.filter: tick_ms of the taps: expected the period of"
-        " the valve, 40 ms, got 20 ms"
-    ]
-    assert checked(tmp_path, "kind: robust, tick_ms: 40, taps: [0.5, 0.5]") == []
-
-
 QUICK = "period_s: 0.31416, damping_ratio: 0"  # 20 rad/s
 
 
 @pytest.mark.parametrize(
     ("text", "sway", "says"),
     [
-        (
-            "kind: robust, tick_ms: 40, taps: [1]",
-            QUICK,
-            "natural frequency: expected up to 17.8571 rad/s for this",
-        ),
         ("kind: zv", "period_s: 0.2, damping_ratio: 0", "natural frequency at a tick of 0.04 s"),
-        (
-            "kind: gff, poles_rad_s: [-4, -26]",
-            "",
-            "pole: expected -25 to below 0 rad/s at a tick of 0.04 s, got -26 rad/s",
-        ),
         (
             "kind: gff, poles_rad_s: [-4, -4], third_pole_rad_s: -26",
             "",
             "pole: expected -25 to below 0 rad/s at a tick of 0.04 s, got -26 rad/s",
-        ),
-        (
-            "kind: two_mode, period_s: 0.15, damping_ratio: 0",
-            "",
-            "second mode: natural frequency at a tick of 0.04 s: expected 0 to 25 rad/s, got"
-            " 41.8879 rad/s",
         ),
     ],
 )

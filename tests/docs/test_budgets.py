@@ -1,9 +1,8 @@
 """Budgets of words, files and lines, so that one person can hold pages and code in the head.
 
 Each page can be read once, from top to bottom. A fact that is added takes the place of another one,
-or moves to the page that it belongs to: a reader of a page that only grows finds nothing on it, and
-two pages with one fact soon contradict each other. What a command writes into a page (tables
-between marks, output of ``canshaper``) is not counted: it grows with the program.
+or moves to the page that it belongs to: two pages with one fact soon contradict each other. What a
+command writes into a page (tables between marks, output of ``canshaper``) is not counted.
 
 Code that is added takes the place of other code, or says here why it may not. A room that only
 grows is no longer reviewed as a whole, and a test that repeats another one is read by no one.
@@ -21,9 +20,9 @@ TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
     "CHANGELOG.md": 690,
-    "CONTRIBUTING.md": 595,
+    "CONTRIBUTING.md": 550,
     "README.md": 620,
-    "SECURITY.md": 390,
+    "SECURITY.md": 350,
     "docs/api.md": 140,
     "docs/architecture.md": 330,
     "docs/calibration.md": 400,
@@ -32,28 +31,28 @@ BUDGET = {
     "docs/checksums.md": 220,
     "docs/commission.md": 710,
     "docs/comparison.md": 590,
-    "docs/decisions.md": 880,
+    "docs/decisions.md": 860,
     "docs/deployment.md": 1830,
-    "docs/devices.md": 510,
+    "docs/devices.md": 430,
     "docs/doctor.md": 350,
-    "docs/export.md": 556,
+    "docs/export.md": 550,
     "docs/glossary.md": 340,
     "docs/guide.md": 970,
-    "docs/identification.md": 560,
+    "docs/identification.md": 550,
     "docs/j1939.md": 580,
     "docs/machine-manual.md": 830,
-    "docs/machines.md": 950,
+    "docs/machines.md": 920,
     "docs/monitor.md": 350,
-    "docs/realtime.md": 400,
-    "docs/replay.md": 810,
-    "docs/safety.md": 2450,
+    "docs/realtime.md": 380,
+    "docs/replay.md": 790,
+    "docs/safety.md": 2390,
     "docs/sensor.md": 930,
-    "docs/service.md": 750,
+    "docs/service.md": 730,
     "docs/states.md": 290,
     "docs/studio.md": 660,
     "docs/study.md": 300,
-    "docs/testing.md": 520,
-    "docs/topologies.md": 700,
+    "docs/testing.md": 480,
+    "docs/topologies.md": 680,
     "docs/troubleshooting.md": 590,
     "docs/tuning.md": 740,
     "docs/work.md": 500,
@@ -63,15 +62,12 @@ BUDGET = {
 # Lines of Python, and why so many.
 LINES = {
     "canshaper/gate": (2_118, "read in a day by someone who has never seen it"),
-    "canshaper/shaping": (
-        4_925,
-        "the method: filters, axis, motion, ends, observer of the sway",
-    ),
-    "canshaper": (66_622, "a new ability takes the room of an old one"),
-    "tests": (99_902, "one level for each behaviour"),
+    "canshaper/shaping": (4_925, "the method: filters, axis, motion, ends, observer of the sway"),
+    "canshaper": (66_474, "a new ability takes the room of an old one"),
+    "tests": (99_487, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
-FILES = {"canshaper": (328, "one that only hands on is joined to its reader")}
+FILES = {"canshaper": (329, "one that only hands on is joined to its reader")}
 
 
 def sources(room: str) -> list[str]:

@@ -1,13 +1,13 @@
 """Each claim of the safety page has one id, and names tests that are there.
 
 A claim begins with its id: P, H, R, G, A and a number, or names of reasons and faults, such as
-SEND_FAILED. It names a test as `room/test_file::part`: a file in ``tests``, and a part, in whole
-words, of the name of one of its functions or cases.
+SEND_FAILED. It, or its row in the table of tests, names `room/test_file::part`: a file in
+``tests``, and a part, in whole words, of the name of one of its functions or cases.
 """
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import pytest
 
@@ -25,9 +25,9 @@ NONE = "none: by the ECU"
 NAMES = {one.name for kind in (Reason, FrameFault) for one in kind}
 
 
-def entries(text: str) -> Iterator[str]:
+def entries(text: str, names: Iterable[str] = SECTIONS) -> Iterator[str]:
     """Rows of tables and points of lists in the sections with claims, each in one line."""
-    for name in SECTIONS:
+    for name in names:
         section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0].partition("\n### ")[0]
         rows = re.sub(r"\n {2,}(?=\S)", " ", section).splitlines()
         ruled = [i for i, row in enumerate(rows) if row.startswith("|--")]
@@ -48,16 +48,18 @@ def is_there(file: str, part: str) -> bool:
 def faults(text: str) -> list[str]:
     """Yield the faults of the claims of a page."""
     wrong, ids = [], Counter[str]()
+    table = {row.split()[1]: row for row in entries(text, ["Tests"])}
     for entry in entries(text):
         claim = CLAIM.match(entry)
         if claim is None:
             wrong.append(f"no id: {entry}")
             continue
         ids.update(claim[1].split(", "))
-        tests = TEST.findall(entry)
+        tests = TEST.findall(entry := entry + table.pop(claim[1], ""))
         if not tests and NONE not in entry:
             wrong.append(f"{claim[1]}: no test")
         wrong += [f"{claim[1]}: {f}::{part} is gone" for f, part in tests if not is_there(f, part)]
+    wrong += [f"{one}: no claim" for one in table]
     wrong += [f"{one}: stands {count} times" for one, count in ids.items() if count > 1]
     names = {one for one in ids if "_" in one}
     wrong += [f"{one}: neither reason nor fault" for one in sorted(names - NAMES)]
@@ -86,6 +88,8 @@ def test_every_reason_to_stop_is_a_claim() -> None:
         ("- SEND_FAILED, BUS_GONE:\n  `hil/frame_faults::error_code`", None),
         ("- P1 it stops. none: by the ECU", None),
         ("- P1 it stops.", "P1: no test"),
+        ("- P1 it stops.\n\n## Tests\n| P1 | `promises/test_1` |", None),
+        ("- P1 `promises/test_1`\n\n## Tests\n| P2 | `promises/test_2` |", "P2: no claim"),
         ("- It stops. `promises/test_1`", "no id: "),
         ("- P1 it stops. `promises/test_0`", "P1: promises/test_0:: is gone"),
         ("- P1 it stops. `promises/test_2::sound_contr`", "P1: promises/test_2::sound_contr is"),

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from tests.rigs.canopen import DBC_FILE, write_variant
-from tests.rigs.files import ROOT, machine_file
+from tests.rigs.files import ROOT, machine_file, problems
 
 LAST_NODE = "lift: { id: 0x22, heartbeat_ms: 500 }"
 
@@ -112,9 +111,3 @@ def test_a_word_of_as_many_bits_as_the_state_has_is_enough(tmp_path: Path) -> No
     (tmp_path / "machine.dbc").write_text(dbc)
     file = write_variant(tmp_path, (str(ROOT / "dbc" / DBC_FILE), "machine.dbc"))
     assert load_deployment(file).axes["slew"].valve is not None
-
-
-def problems(file: Path) -> list[str]:
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(file)
-    return [str(problem) for problem in caught.value.problems]

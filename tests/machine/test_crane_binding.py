@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
-from tests.rigs.files import CONFIG, ROOT, read
+from tests.rigs.files import CONFIG, ROOT, problems, read
 from tests.rigs.overhead import FILE, changed
 
 CRANE = "crane: { kind: cartesian, bridge: bridge, trolley: trolley, hoist: hoist }"
@@ -49,15 +48,11 @@ def test_without_it_the_names_say_it() -> None:
     ],
 )
 def test_what_is_none_is_said_in_a_line(tmp_path: Path, old: str, new: str, says: str) -> None:
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(changed(tmp_path, (old, new)))
-    assert says in str(caught.value)
+    assert says in rope_problems(tmp_path, (old, new))
 
 
 def rope_problems(tmp_path: Path, *changes: tuple[str, str]) -> str:
-    with pytest.raises(ConfigError) as caught:
-        load_deployment(changed(tmp_path, *changes))
-    return str(caught.value)
+    return "\n".join(problems(changed(tmp_path, *changes)))
 
 
 def test_a_signal_without_a_range_is_no_length(tmp_path: Path) -> None:
@@ -68,9 +63,7 @@ def test_a_signal_without_a_range_is_no_length(tmp_path: Path) -> None:
         ('[0.5|160] "m"', '[0.5|160] "deg"', "RopeLength: expected a length in m, got a signal in"),
     ):
         (tmp_path / "own.dbc").write_text(dbc.replace(old, new), encoding="cp1252")
-        with pytest.raises(ConfigError) as caught:
-            load_deployment(path)
-        assert says in str(caught.value)
+        assert any(says in problem for problem in problems(path))
 
 
 def test_a_filter_that_follows_no_rope_is_refused(tmp_path: Path) -> None:

@@ -19,12 +19,6 @@ def test_only_what_is_used_is_limited(machine: Machine, monkeypatch: pytest.Monk
     machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 208")
     (problem,) = machine.problems()
     assert "expected 200 bytes at most in its messages, got " in problem
-    monkeypatch.setattr(dbc_parse, "MOST_WORDS", 10)
-    (problem,) = machine.problems()
-    assert "expected 10 words at most, got " in problem
-    monkeypatch.setattr(dbc_parse, "MOST_PARSED", 100)
-    (problem,) = machine.problems()
-    assert "expected 100 bytes at most in what is used of it, got " in problem
 
 
 @pytest.mark.parametrize("most", ["MOST_MESSAGES", "MOST_STATEMENTS", "MOST_PARSED"])

@@ -65,19 +65,6 @@ def test_all_warnings_are_counted_and_the_first_kept(machine: Machine) -> None:
     assert "Other" in str(warnings[0])
 
 
-def test_their_ids_and_names_are_known(machine: Machine) -> None:
-    machine.in_dbc("CM_ ", OTHER + OTHER.replace("BO_ 5 O", "BO_ 2147483653 Wide") + "\nCM_ ")
-    messages = machine.load().messages
-    assert {(5, False), (5, True), (272, False)} <= messages.ids()
-    assert messages.named({(5, False), (5, True), (6, False)}) == ["Other", "Widether"]
-    assert "Other" not in {m.name for m in messages.all()}
-    names = ", ".join(messages.named(messages.ids()))
-    assert (
-        messages.find("None")
-        == f"expected a message of the DBC files, got 'None'; there are {names}"
-    )
-
-
 def test_check_shows_the_first_of_them(machine: Machine) -> None:
     machine.load()
     command = ["check", str(machine.directory / "machine.yaml")]
@@ -114,13 +101,6 @@ def test_another_message_is_read_when_it_is_asked_for(machine: Machine) -> None:
     path.unlink()
     assert messages.find("TipPosition") == entry
     assert messages.find("GrappleSway") == f"{path}: No such file or directory"
-
-
-def test_another_message_that_cannot_be_used(machine: Machine) -> None:
-    machine.in_dbc("CM_ ", OTHER.replace("8|8", "9|8") + "\nCM_ ")
-    result = machine.load().messages.find("Other")
-    assert isinstance(result, str)
-    assert "The signal Two does not fit in message Other" in result
 
 
 def overlap(length: int, *signals: str) -> str | None:

@@ -61,7 +61,7 @@ def test_what_runs_is_told_by_the_bytes_of_the_files(machine: Machine) -> None:
 def error_names(machine: Machine, names: str) -> list[str]:
     """Problems with names of values in the DBC, without file and line."""
     machine.in_dbc("VAL_ 272 Enable", f"{names}\nVAL_ 272 Enable")
-    return [problem.partition(": ")[2] for problem in machine.problems()]
+    return machine.faults()
 
 
 def test_no_breakpoint_is_a_value_that_is_an_error(chosen: Machine) -> None:

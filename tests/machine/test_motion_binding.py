@@ -84,7 +84,6 @@ def measured(**changes: str) -> str:
             measured(message="Tip"),
             ".radius.message: expected a message of the DBC files, got 'Tip'; there are",
         ),
-        (measured(bus="boom"), ".radius.bus: expected a bus, got 'boom'; there are crane"),
         (
             measured(timeout_ms="30"),
             ".radius.timeout_ms: expected 40 ms or more, twice the cycle of TipPosition, got 30",

@@ -42,11 +42,16 @@ def line_of(file: Path, text: str) -> int:
     return next(n for n, line in enumerate(file.read_text().splitlines(), 1) if text in line)
 
 
-def faults(file: Path) -> list[str]:
-    """Every problem of a deployment, without file and line."""
+def problems(file: Path) -> list[str]:
+    """Every problem of a deployment, without the folder."""
     with pytest.raises(ConfigError) as caught:
         load_deployment(file)
-    return [str(one).partition(": ")[2] for one in caught.value.problems]
+    return [str(one).replace(f"{file.parent}/", "") for one in caught.value.problems]
+
+
+def faults(file: Path) -> list[str]:
+    """Every problem of a deployment, without file and line."""
+    return [one.partition(": ")[2] for one in problems(file)]
 
 
 class Machine:
@@ -78,17 +83,23 @@ class Machine:
         self.dbc = self.dbc.replace(old, new, 1)
         return line
 
-    def load(self) -> Deployment:
+    def write(self) -> Path:
+        """Write both files; return the deployment file."""
         path = self.directory / "machine.yaml"
         path.write_text(self.yaml, encoding="utf-8")
         (self.directory / "machine.dbc").write_text(self.dbc, encoding="cp1252")
-        return load_deployment(path)
+        return path
+
+    def load(self) -> Deployment:
+        return load_deployment(self.write())
 
     def problems(self) -> list[str]:
         """Every problem, without the directory."""
-        with pytest.raises(ConfigError) as caught:
-            self.load()
-        return [str(p).replace(f"{self.directory}/", "") for p in caught.value.problems]
+        return problems(self.write())
+
+    def faults(self) -> list[str]:
+        """Every problem, without file and line."""
+        return faults(self.write())
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.commissioning.stopping import needed_s, travel
-from canshaper.machine.stopping import allowed_s
+from canshaper.machine.stop_distance import allowed_s
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.states import CommandInput, Reason, State

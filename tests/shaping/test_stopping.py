@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.commissioning.stopping import Travel, travel
-from canshaper.machine.stopping import allowed_s
+from canshaper.machine.stop_distance import allowed_s
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.limits import OutputLimits, ValveCurve
 from canshaper.shaping.registry import build_shaper

@@ -14,7 +14,7 @@ from canshaper.campaign.run import Source, run_campaign
 from canshaper.campaign.store import Store
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
-from canshaper.cli.playback import opened_drives
+from canshaper.cli.finished_drives import opened_drives
 from canshaper.design.parallel import Processes
 from canshaper.studio import in_process
 from canshaper.studio.playback import Playback

@@ -22,6 +22,7 @@ from canshaper.cli.interview.first import FirstAxis, FirstJoystick, FirstMachine
 from canshaper.cli.interview.nodes import Nodes, uses_of
 from canshaper.cli.interview.swing import load_of, motion_of
 from canshaper.codec.layout import is_fd
+from canshaper.codec.status import IDENTITY, SERVICE_STATUS, required_names
 from canshaper.commissioning import suggest
 from canshaper.config.bus import Bus
 from canshaper.config.inputs import Protected
@@ -73,7 +74,8 @@ def machine_of(
     valves = {axis.valve for axis in axes}
     left = [message for message in messages if message.name not in valves]
     load = load_of(axes, left, _meanings([joystick for joystick, _ in joysticks], axes, motion))
-    status, identity = suggest.service_status(messages), suggest.identity(messages)
+    status = suggest.with_signals(required_names(SERVICE_STATUS), messages)
+    identity = suggest.with_signals(required_names(IDENTITY), messages)
     machine = FirstMachine(
         channel=channel_name,
         bitrate=bitrate,

@@ -47,7 +47,9 @@ def demo(
     file: str = typer.Argument(DEFAULT, help="Deployment file; by default a shipped one."),
     sensor: bool = SENSOR,
     script: str = typer.Option(
-        "demo", "--script", help="Script of the operator; `canshaper operator --list` lists them."
+        "demo",
+        "--script",
+        help="Script of the operator; `canshaper operator FILE --list` lists them.",
     ),
     rest: float | None = typer.Option(
         None,

@@ -22,10 +22,10 @@ def export(
 ) -> None:
     """Write the axes and their motion as C99, for a controller without Python.
 
-    The C code is the same for every machine; export writes its tables. Its valve frames equal
-    those of this program to the last bit. A key that the C code does not support (sway sensors,
-    gain schedules, E2E, J1939, CANopen and more) is refused by name. The folder has a self-test
-    with a golden drive, which also runs on the target: make -C axis && axis/selftest.
+    The C code is the same for every machine; export writes its tables. Without --float its valve
+    frames equal those of this program to the last bit. A key that the C code does not support (sway
+    sensors, gain schedules, E2E, J1939, CANopen and more) is refused by name. The folder has a
+    self-test with a golden drive, which also runs on the target: make -C axis && axis/selftest.
 
     --fmu writes a unit for other simulators: the same C code, or the simulated crane.
 

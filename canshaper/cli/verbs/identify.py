@@ -106,7 +106,7 @@ def identify(
     """
     # Its matrices are small: threads of the linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from canshaper.cli.fleet import check_only_folders, identified, run_fleet, show_periods
+    from canshaper.cli.log_folders import check_only_folders, identified, run_fleet, show_periods
     from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.pump import drives_in, pair_of, pump_lines
     from canshaper.commissioning.identification.canlog import messages_of

@@ -70,7 +70,8 @@ def init(
 
     With --answers it asks nothing. Each line of that file is QUESTION = ANSWER. A question is given
     by its first words, that of an axis with its name first, such as "slew: time of ten full swings
-    = 24.1". "#" begins a comment. A question without a line is answered as by Enter.
+    = 24.1". A question of yes or no is answered by yes or no. "#" begins a comment. A question
+    without a line is answered as by Enter.
 
     Examples:
 

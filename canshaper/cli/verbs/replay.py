@@ -94,7 +94,7 @@ def replay(
 
       canshaper replay logs/ --config old.yaml --config new.yaml
     """
-    from canshaper.cli.fleet import check_only_folders
+    from canshaper.cli.log_folders import check_only_folders
     from canshaper.cli.results import Results
     from canshaper.recording.record import unpack
 
@@ -143,7 +143,7 @@ def _fleet(
     results: "Results",
 ) -> None:
     """Replay every log of a folder, and print one table of all."""
-    from canshaper.cli.fleet import replayed, run_fleet, show_replays
+    from canshaper.cli.log_folders import replayed, run_fleet, show_replays
 
     if not configs:
         raise typer.BadParameter("--config is missing: which deployment?")

@@ -171,24 +171,21 @@ def for_fleet(
     results = Results("Filters for a fleet", deployment, report, picture)
     with progress_bar("candidates") as on_progress:
         asked, rows = design_fleet(deployment, kind, duration_s, Processes(), on_progress)
-    results.print(table(asked, rows))
-    results.print(verdict(asked, rows), soft_wrap=True)
-    if path := results.picture(None, lambda: figure(rows)):
-        results.picture_line(path)
     if write:
         verb = "tune" if kind == "gff" else kind
-        lines = [
-            *write_fleet(deployment, asked.filters, verb),
-            written_line(deployment.path),
-        ]
+        lines = [*write_fleet(deployment, asked.filters, verb), written_line(deployment.path)]
     else:
         lines = [
             f"axes.{one.axis}:\n  sway: {flow(one.sway)}\n  filter: {flow(one.section)}"
             + (f"\n  limits: {flow({'tail_s': one.tail_s})}" if one.tail_s else "")
             for one in asked.filters
         ]
-    results.print("\n".join(lines), soft_wrap=True)
-    results.write()
+
+    def show(to: Results) -> None:
+        to.print(table(asked, rows))
+        to.print(verdict(asked, rows), soft_wrap=True)
+
+    results.conclude(show, figure=lambda: figure(rows), after=lines)
 
 
 def _lengths(text: str | None) -> tuple[float, float] | None:

@@ -108,7 +108,7 @@ def _changed(
     """Return a loader that checks the deployment and applies these options to it."""
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError, Problem
-    from canshaper.machine.stopping import rehearsed_valves, unstated
+    from canshaper.machine.stop_distance import rehearsed_valves, unstated
 
     def changed() -> "Deployment":
         deployment = load()

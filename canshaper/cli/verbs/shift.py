@@ -62,7 +62,7 @@ def shift(
 
       canshaper shift recording.zip
     """
-    from canshaper.cli.fleet import logs_below
+    from canshaper.cli.log_folders import logs_below
     from canshaper.cli.results import Results
     from canshaper.recording.shift import Shifts
     from canshaper.report.console import NOTHING, new_table, progress_bar

@@ -124,7 +124,7 @@ def studio(
 
       canshaper studio forwarder.yaml --seed 34
     """
-    from canshaper.cli.playback import is_drive, opened_drives
+    from canshaper.cli.finished_drives import is_drive, opened_drives
     from canshaper_sim.parameters import changed_parameters
 
     # A service manager ends it with SIGTERM; uvicorn raises the signal again when it is done.

@@ -1,12 +1,12 @@
 """``canshaper tune``: design the G_FF filter of an axis."""
 
-import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, echo, loader, refuse_shipped
+from canshaper.cli.common import EXIT_USELESS, FILE, PICTURE, REPORT, loader, refuse_shipped
 from canshaper.errors import UsageError
 
 GROUP = "design"
@@ -78,8 +78,8 @@ def tune(
     It prints the new filter next to that of the file, the swing left when the pendulum is up to
     30 % longer or shorter, the constraints that bound the optimum, and a verdict. It draws
     OUT/AXIS.png. An option that is not given has the value with which the file's filter was tuned.
-    Exit code 1 when more than half of the swing is left; 2 when the options exclude each other: the
-    error names them.
+    Exit code 1 when more than half of the swing is left; 2 when no filter meets all constraints:
+    the error names those that conflict.
 
     With --fleet it tunes all swinging axes together, as canshaper robust --fleet designs them,
     within the run-on of --max-run-on (2.25 s), and compares them with robust shapers of that
@@ -142,17 +142,20 @@ def tune(
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
     useless = one.verdict.useless and not force
-    drawn = results.picture(out / f"{axis}.png", lambda: figure(one))
     changed = write_tuned(deployment, one) if write and not useless else []
     written = deployment.path if write and not useless else None
-    if as_json:
-        files = {"picture": drawn, "written": written, "changed": changed}
-        echo(json.dumps(as_dict(one) | files, indent=2, default=str))
-    print_tuned(deployment, one, results)
-    results.picture_line(drawn)
-    if written and not as_json:
-        echo("\n".join([*changed, written_line(written)]))
-    results.write(EXIT_USELESS if useless else 0)
+
+    def data(path: Path | None) -> dict[str, Any]:
+        return as_dict(one) | {"picture": path, "written": written, "changed": changed}
+
+    results.conclude(
+        partial(print_tuned, deployment, one),
+        figure=lambda: figure(one),
+        path=out / f"{axis}.png",
+        data=data if as_json else None,
+        after=[*changed, written_line(written)] if written else (),
+        code=EXIT_USELESS if useless else 0,
+    )
 
 
 def _numbers(text: str | None) -> list[float] | None:

@@ -136,12 +136,12 @@ class CalibrationDrive:
 
     @property
     def _moved(self) -> str:
-        """Axes that are not measured and whose joystick is not in neutral."""
+        """Names of axes that are not measured and whose joystick is not in neutral, for people."""
         return " and ".join(name for name, joystick in self._joysticks.items() if joystick.moved)
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last is that of a valve, and any axis moves."""
+        """Whether the last frame that was handed out is a valve's, and an axis moves."""
         return self._gated.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
@@ -193,7 +193,7 @@ class CalibrationDrive:
         self._gated.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """Whether a valve frame that comes too late must not leave."""
+        """Return whether a valve frame comes too late to leave."""
         return self._gated.withhold(frame)
 
     def stalled(self) -> None:

@@ -45,7 +45,7 @@ Mean = tuple[float, float]
 """A value and half the width of its interval of 95 %."""
 
 
-class Direction(NamedTuple):
+class PumpFlow(NamedTuple):
     """Both axes at once, each in one direction.
 
     Attributes:
@@ -66,7 +66,7 @@ Bins = list[tuple[float, float]]
 Seen = Mapping[tuple[int, ...], tuple[Bins, Bins]]
 
 
-def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[Direction]:
+def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[PumpFlow]:
     """Measure the flow of the pump for each pair of directions, sorted by flow, least first.
 
     Args:
@@ -91,7 +91,7 @@ def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -
 
 def _direction(
     axes: Sequence[str], ways: tuple[int, int], seen: Seen, shares: Mapping[str, float]
-) -> Direction:
+) -> PumpFlow:
     kept, asked, rises = [], [], True
     for i, (name, way) in enumerate(zip(axes, ways, strict=True)):
         alone = [seen[(s * way, 0) if i == 0 else (0, s * way)][i] for s in (AT_MOST, UP, DOWN)]
@@ -118,7 +118,7 @@ def _direction(
         text = f"flow at most {flow:.2f}, what one axis takes, which may lack oil alone too"
         cure = "drive each alone slowly up to its largest command and back, as calibrate does"
         raise CalibrationError(f"{text}; {cure}")
-    return Direction(ways, kept, sum(asked), (flow, half))
+    return PumpFlow(ways, kept, sum(asked), (flow, half))
 
 
 def _gain(bins: Bins, zero: float) -> Mean:
@@ -228,19 +228,10 @@ def drives_in(
     speeds: Mapping[str, str],
     channel: str | None,
 ) -> Drives:
-    """Return demands and speeds of two axes out of logs.
-
-    Args:
-        deployment: the machine.
-        logs: of drives of each axis alone, and of both at once.
-        axes: names of the two.
-        speeds: MESSAGE.SIGNAL of their speeds, of those whose speed the file does not name.
-        channel: bus of the logs that is read; None for all.
+    """Return demands and speeds of two axes out of logs; see ``read_can`` and ``speed_signal``.
 
     Raises:
         IdentificationError: commands or speeds of an axis are not in a log.
-        LogError: a log cannot be read.
-        UsageError: no signal of a speed is named, and none is known.
     """
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
     drives = []

@@ -47,12 +47,12 @@ class Ramp:
 
     @property
     def up_s(self) -> float:
-        """Time of the way up, or down."""
+        """Time in which the command rises to the top, or falls from it."""
         return self.top / self.rate_per_s
 
     @property
     def duration_s(self) -> float:
-        """Time of all of it."""
+        """Time of the whole ramp, both directions and three rests."""
         return 2.0 * self.half_s + self.rest_s
 
     @property
@@ -188,7 +188,7 @@ class SpeedFeedback:
 
     @property
     def value(self) -> float:
-        """The last speed that counted, in the unit of the DBC."""
+        """The last valid speed, in the unit of the DBC."""
         return self._input.value
 
     def valid(self, now_ns: int) -> bool:
@@ -220,9 +220,8 @@ def _find(deployment: Deployment, message: str, signal: str, *, fd: bool) -> tup
     definition = find_signal(match[1], signal)
     if definition is None:
         names = ", ".join(s.name for s in match[1].signals)
-        raise _problem(
-            deployment, f"expected a signal of {message}, got {signal!r}; there are {names}"
-        )
+        text = f"expected a signal of {message}, got {signal!r}; there are {names}"
+        raise _problem(deployment, text)
     if match[1].is_multiplexed():
         raise _problem(deployment, f"{message} is multiplexed; nothing can be read from it")
     lengths = FD_LENGTHS if fd else range(CLASSICAL_BYTES + 1)

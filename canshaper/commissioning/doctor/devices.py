@@ -56,18 +56,8 @@ class Link:
     data: dict[str, Any]
     counts: dict[str, int]
 
-    @property
-    def bitrate(self) -> int | None:
-        """Bit rate, bit/s."""
-        return self._rate("bittiming")
-
-    @property
-    def data_bitrate(self) -> int | None:
-        """Bit rate of the data of CAN FD, bit/s."""
-        return self._rate("data_bittiming")
-
-    def _rate(self, timing: str) -> int | None:
-        """Return the rate of a timing; of an adapter without timings, the rate that it reports."""
+    def rate(self, timing: str = "bittiming") -> int | None:
+        """Return the bit rate of a timing, bit/s; an adapter without timings reports its rate."""
         rate = self.data.get(timing, {}).get("bitrate", self.data.get(f"{timing}_bitrate"))
         return int(rate) if rate else None
 

@@ -27,28 +27,20 @@ def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
         tick_ms: period of the loop.
     """
     subject = f"bus {name} {bus.interface}"
-    yield Finding(
-        subject, Level.NOTE, f"python-can on {bus.channel}: cannot be checked without opening it"
-    )
+    text = f"python-can on {bus.channel}: cannot be checked without opening it"
+    yield Finding(subject, Level.NOTE, text)
     older_ms = tick_ms if bus.interface in NEVER_BLOCK else LOOK_S * 1000
-    yield Finding(
-        f"{subject} time stamps",
-        Level.NOTE,
-        f"none that can be trusted: a frame counts as up to {older_ms:g} ms older than it is",
-        f"give the timeout_ms of inputs {older_ms:g} ms more",
-    )
+    text = f"none that can be trusted: a frame counts as up to {older_ms:g} ms older than it is"
+    remedy = f"give the timeout_ms of inputs {older_ms:g} ms more"
+    yield Finding(f"{subject} time stamps", Level.NOTE, text, remedy)
     if bus.interface in ERROR_FRAMES:
         yield Finding(f"{subject} error frames", Level.OK, "handed out, and counted")
     else:
         text = "none: a disturbed bus is noticed when the frames of the joysticks stay away"
         yield Finding(f"{subject} error frames", Level.NOTE, text)
-    yield Finding(
-        f"{subject} send confirmation",
-        Level.WARNING,
-        "none: a frame that no node acknowledges counts as sent, so a cut line to a valve trips no"
-        " axis",
-        "an adapter with a SocketCAN driver of its own, or feedback of the valve",
-    )
+    text = "none: a frame that no node acknowledges counts as sent, so a cut line to a valve trips"
+    remedy = "an adapter with a SocketCAN driver of its own, or feedback of the valve"
+    yield Finding(f"{subject} send confirmation", Level.WARNING, f"{text} no axis", remedy)
 
 
 # Lengths of the transmit queue, frames. The frames of one tick do not fit into a shorter one; a
@@ -115,7 +107,7 @@ def up(link: Link, bus: Bus) -> Finding:
     """Check that the interface is up."""
     if link.up:
         return Finding(link.name, Level.OK, "up")
-    rate = link.bitrate or bus.bitrate or 250_000
+    rate = link.rate() or bus.bitrate or 250_000
     options = f"bitrate {rate} {fd_options(bus)}{'restart-ms 100' * link.echo}".strip()
     remedy = f"sudo ip link set {link.name} up type can {options}"
     return Finding(link.name, Level.BAD, "is down", remedy)
@@ -134,10 +126,10 @@ def echo(link: Link, bus: Bus) -> list[Finding]:
 def bitrate(link: Link, bus: Bus) -> Finding | None:
     """Check the bit rate against that of the file, where the file has one."""
     subject = f"{link.name} bit rate"
-    if link.bitrate is None:
+    if link.rate() is None:
         return None
-    rate = f"{link.bitrate} bit/s"
-    if bus.bitrate is None or bus.bitrate == link.bitrate:
+    rate = f"{link.rate()} bit/s"
+    if bus.bitrate is None or bus.bitrate == link.rate():
         return Finding(subject, Level.OK, rate)
     return Finding(subject, Level.BAD, f"{rate}, in the file {bus.bitrate} bit/s", WRONG_RATE)
 
@@ -151,7 +143,7 @@ def fd(link: Link, bus: Bus) -> list[Finding]:
         what = "mtu 72" if link.kind in ("vcan", "vxcan") else f"type can {fd_options(bus)}".strip()
         remedy = f"with {link.name} down: sudo ip link set {link.name} {what}"
         return [Finding(subject, Level.BAD, f"off, the MTU is {link.mtu}", remedy)]
-    rate = link.data_bitrate
+    rate = link.rate("data_bittiming")
     if rate is None or rate == bus.data_bitrate:
         return [Finding(subject, Level.OK, f"on, data {rate} bit/s" if rate else "on")]
     expected = f"{bus.data_bitrate} bit/s" if bus.data_bitrate else "none"
@@ -222,12 +214,9 @@ def restart(link: Link) -> Finding:
     if not link.echo:  # nor has such a driver a restart
         remedy = f"after bus-off: sudo ip link set {link.name} down, then up"
         return Finding(subject, Level.WARNING, "none by itself", remedy)
-    return Finding(
-        subject,
-        Level.WARNING,
-        "restart-ms 0: silent after bus-off until somebody restarts it",
-        f"with {link.name} down: sudo ip link set {link.name} type can restart-ms 100",
-    )
+    text = "restart-ms 0: silent after bus-off until somebody restarts it"
+    remedy = f"with {link.name} down: sudo ip link set {link.name} type can restart-ms 100"
+    return Finding(subject, Level.WARNING, text, remedy)
 
 
 def modes(link: Link) -> Finding:

@@ -136,7 +136,7 @@ class Waving(Script):
     """A script that moves every joystick of any machine without end."""
 
     def command(self, axis: str, time_s: float) -> float:
-        """Joystick value; the same for all axes."""
+        """Return the deflection at a time, the same for all axes."""
         stroke, at_s = divmod(time_s, NEUTRAL_S + STROKE_S)
         way = (at_s - NEUTRAL_S) / STROKE_S
         if way <= 0.0:
@@ -165,7 +165,7 @@ class Joysticks:
         self.sent: dict[str, list[tuple[int, int]]] = {name: [] for name in sockets}
 
     def run(self) -> None:
-        """Play until the other end is closed."""
+        """Send the frames of the joysticks until the other end is closed."""
         run_at_deadlines(round(self._step_ms * 1_000_000 * SLOWER), self._body)
 
     def _body(self, _now_ns: int, missed: int, _late_ns: int) -> bool:

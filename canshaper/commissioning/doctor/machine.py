@@ -92,12 +92,8 @@ def throttling(root: Path) -> Finding:
     text = f"{100 * share:.0f} % of the time"
     if share >= 0.5:
         return Finding("real-time share", Level.OK, text)
-    return Finding(
-        "real-time share",
-        Level.BAD if share == 0 else Level.WARNING,
-        text,
-        "sudo sysctl kernel.sched_rt_runtime_us=950000",
-    )
+    remedy = "sudo sysctl kernel.sched_rt_runtime_us=950000"
+    return Finding("real-time share", Level.BAD if share == 0 else Level.WARNING, text, remedy)
 
 
 def swap(root: Path) -> Finding:
@@ -108,12 +104,9 @@ def swap(root: Path) -> Finding:
         return Finding("swap", Level.OK, "none")
     if used_kib == 0:
         return Finding("swap", Level.OK, "there, and not used")
-    return Finding(
-        "swap",
-        Level.WARNING,
-        f"{used_kib / 1024:.0f} MiB in use: memory is short",
-        "more memory or fewer programs; then sudo swapoff -a. The daemon's own memory is locked",
-    )
+    text = f"{used_kib / 1024:.0f} MiB in use: memory is short"
+    cure = "more memory or fewer programs; then sudo swapoff -a. The daemon's own memory is locked"
+    return Finding("swap", Level.WARNING, text, cure)
 
 
 def huge_pages(root: Path) -> Finding:
@@ -142,12 +135,9 @@ def governor(root: Path) -> Finding:
     text = ", ".join(sorted(names))
     if names == {"performance"}:
         return Finding("governor", Level.OK, text)
-    return Finding(
-        "governor",
-        Level.WARNING,
-        f"{text}: the processor is slow when the loop wakes up",
-        "sudo cpupower frequency-set -g performance, at every boot",
-    )
+    text += ": the processor is slow when the loop wakes up"
+    remedy = "sudo cpupower frequency-set -g performance, at every boot"
+    return Finding("governor", Level.WARNING, text, remedy)
 
 
 def idle_states(root: Path, tick_ms: int) -> Finding:
@@ -211,12 +201,9 @@ def virtual(hypervisor: str | None, root: Path) -> Finding:
         hypervisor = "a hypervisor"
     if hypervisor in (None, "none"):
         return Finding("virtual machine", Level.OK, "none is to be seen")
-    return Finding(
-        "virtual machine",
-        Level.WARNING,
-        f"{hypervisor}: its host decides when this system runs",
-        "run the crane on a PC without one, or give the machine processors of its own",
-    )
+    text = f"{hypervisor}: its host decides when this system runs"
+    remedy = "run the crane on a PC without one, or give the machine processors of its own"
+    return Finding("virtual machine", Level.WARNING, text, remedy)
 
 
 def _virtualisation() -> str | None:

@@ -148,9 +148,8 @@ def _share_finding(
     if part <= good:
         return Finding(subject, Level.OK, measured)
     if part <= worst:
-        return Finding(
-            subject, Level.WARNING, f"{measured}; good is up to {100 * good:g} %", remedy
-        )
+        text = f"{measured}; good is up to {100 * good:g} %"
+        return Finding(subject, Level.WARNING, text, remedy)
     return Finding(subject, Level.BAD, f"{measured}; expected is up to {100 * worst:g} %", remedy)
 
 
@@ -181,26 +180,21 @@ def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
         return Finding(subject, Level.OK, measured)
     seldom = run.missed * MISSED_ONE_IN <= of
     level = Level.WARNING if seldom and name == LOADED else Level.BAD
-    longest_ms = max(run.late_ns) / 1e6
-    return Finding(
-        subject, level, f"{measured}, the latest tick {longest_ms:.1f} ms late", _held_up(run)
-    )
+    text = f"{measured}, the latest tick {max(run.late_ns) / 1e6:.1f} ms late"
+    return Finding(subject, level, text, _held_up(run))
 
 
 def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
     """Judge the time from joystick to valve beyond the wait for the next valve frame."""
     subject = f"joystick to valve {name}"
-    quantiles = summary(run.joystick_ns)
-    if quantiles is None:
-        return Finding(
-            subject, Level.BAD, "no valve frame answered a joystick", "measure longer: --seconds"
-        )
+    times = summary(run.joystick_ns)
+    if times is None:
+        text = "no valve frame answered a joystick"
+        return Finding(subject, Level.BAD, text, "measure longer: --seconds")
     tick_ms = deployment.config.tick_ms
     longest_ms = tick_ms * max(axis.period_ticks for axis in deployment.axes.values())
-    text = (
-        f"p99.9 {quantiles.p99_9 / 1000:.1f} ms, of which up to {longest_ms} ms wait for the cycle"
-    )
-    if quantiles.p99_9 <= 1000.0 * (longest_ms + LATE_SHARES[1] * tick_ms):
+    text = f"p99.9 {times.p99_9 / 1000:.1f} ms, of which up to {longest_ms} ms wait for the cycle"
+    if times.p99_9 <= 1000.0 * (longest_ms + LATE_SHARES[1] * tick_ms):
         return Finding(subject, Level.OK, text)
     return Finding(subject, Level.WARNING, f"{text}: more than that explains", _held_up(run))
 
@@ -208,9 +202,7 @@ def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
 def motion(name: str, run: Run, axes: list[str]) -> Finding:
     """Check that every axis moved as on the machine, and that none stopped."""
     subject = f"axes {name}"
-    stops = Counter(
-        f"{axis} {state} {reason}" for axis, state, reason in run.events if state in LOST
-    )
+    stops = Counter(f"{axis} {state} {why}" for axis, state, why in run.events if state in LOST)
     text = ", ".join(f"{what} ({count})" for what, count in stops.items())
     if OVERLOADED & {reason for _, _, reason in run.events}:
         return Finding(subject, Level.BAD, f"the loop was too late: {text}", _held_up(run))

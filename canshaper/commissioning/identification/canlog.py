@@ -140,10 +140,8 @@ def read_can(
         load = _Reader("load state", state.message, signal, Unit(Kind.OTHER, 1.0, ""))
     commands = Commands(deployment)
     log = LogFile(path, on_progress)
-    seen, notes = _read(
-        log, path, channel, [*readers.values(), *([load] if load else [])], commands
-    )
-    load_value = float(np.median(load.samples.value)) if load and load.samples.value else None
+    seen, notes = _read(log, path, channel, [*readers.values(), *filter(None, [load])], commands)
+    at = float(np.median(load.samples.value)) if load and load.samples.value else None
     idle = commands.idle()
     result = {}
     for axis, reader in readers.items():
@@ -151,9 +149,7 @@ def read_can(
         time, value = ordered(f"{path}: {reader.name}", *reader.samples.arrays())
         source, texts = f"{path.name}: {reader.name}", [*notes, *left_out]
         own, others = commands.of(axis), commands.others(axis)
-        result[axis] = Series(
-            source, reader.unit, time, value, own, idle, others, load_value, texts
-        )
+        result[axis] = Series(source, reader.unit, time, value, own, idle, others, at, texts)
     return result
 
 

@@ -168,11 +168,7 @@ def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str
 
 
 def axis_named(axis: str | None, deployment: Deployment | None) -> str:
-    """Return the axis of data that name none: that of --axis.
-
-    Raises:
-        UsageError: the deployment has no such axis.
-    """
+    """Return the axis of data that name none: that of --axis."""
     if deployment is None:
         return axis or UNNAMED
     if axis not in deployment.axes:
@@ -183,11 +179,7 @@ def axis_named(axis: str | None, deployment: Deployment | None) -> str:
 
 
 def signals_named(pairs: Sequence[str], deployment: Deployment | None) -> dict[str, str]:
-    """Return the name of the signal of each axis, out of AXIS=NAME.
-
-    Raises:
-        UsageError: a pair is none, or an axis has two signals.
-    """
+    """Return the name of the signal of each axis, out of AXIS=NAME."""
     signals: dict[str, str] = {}
     for pair in pairs:
         axis, _, name = pair.partition("=")
@@ -210,13 +202,7 @@ def logged(
     channel: str | None = None,
     about_s: float | None = None,
 ) -> list[SwingFinding]:
-    """Return the findings of logs, one for each axis and label.
-
-    Raises:
-        UsageError: there is no log, or no signal is named.
-        IdentificationError: a signal is not in a log.
-        LogError: a log cannot be read.
-    """
+    """Return the findings of logs, one for each axis and label; see ``read_can``."""
     if not logs:
         raise UsageError(
             "expected a log or a stopwatch, got neither; see canshaper identify --help"
@@ -249,10 +235,7 @@ def logged(
 
 
 def _slower_s(deployment: Deployment | None, axis: str) -> float | None:
-    """Return the period in the file where its filter covers a second mode; else None.
-
-    The second mode may swing as much as the first.
-    """
+    """Return the period in the file where its filter covers a second mode, which may swing too."""
     bound = deployment.axes.get(axis) if deployment else None
     design = bound.config.filter.design() if bound else None
     sway = bound.config.sway if bound and design and design.second else None

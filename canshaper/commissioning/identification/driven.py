@@ -79,9 +79,7 @@ class DrivenFit:
     full_speed_m_s: Value | None  # of the tip at full command; None where the signal is no angle
     period_s: Value | None  # of the damped swing, where it was looked for
     damping_ratio: Value | None  # where it was looked for
-    explained: (
-        float  # part of the swing, without what free swings explain, that the commands explain
-    )
+    explained: float  # part of the swing that the commands explain, free swings left out
     delay_s: float  # delay and lag of the valve together
     stretches: list[Stretch]
 

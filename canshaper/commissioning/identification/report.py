@@ -13,7 +13,7 @@ from canshaper.config.limits import Sway
 from canshaper.edit.edit import Change, FileValue, change, flow, note
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import stop_fault
+from canshaper.machine.stop_distance import stop_fault
 from canshaper.report.console import axis_title
 
 # Without a signal of the grapple one value in the middle is recommended up to this difference of

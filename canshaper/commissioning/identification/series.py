@@ -147,7 +147,7 @@ class Segment:
 
     @property
     def end_s(self) -> float:
-        """Its end in the log."""
+        """Time of its end in the log, s."""
         return self.start_s + float(self.time_s[-1])
 
 
@@ -221,12 +221,12 @@ class Samples:
     value: "array[float]" = field(default_factory=lambda: array("d"))
 
     def add(self, time_s: float, value: float) -> None:
-        """Put one in."""
+        """Append a sample."""
         self.time_s.append(time_s)
         self.value.append(value)
 
     def arrays(self) -> tuple[Array, Array]:
-        """Times and values."""
+        """Return times and values as arrays."""
         return np.array(self.time_s), np.array(self.value)
 
 

@@ -44,7 +44,7 @@ class Table:
     notes: list[str]  # what was left out
 
     def unit(self, name: str) -> Unit:
-        """Unit of a column; a gyroscope without one is in rad/s, as phones have it.
+        """Return the unit of a column; a gyroscope without one is in rad/s, as phones have it.
 
         Raises:
             IdentificationError: it is an acceleration.

@@ -3,7 +3,7 @@
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rich.text import Text
 
@@ -57,7 +57,7 @@ class MessageRate:
             self.times.popleft()
 
     def per_s(self, now_ns: int) -> float:
-        """Frames a second."""
+        """Return the frames a second within the window."""
         self.invalidate(now_ns)
         return len(self.times) * 1e9 / WINDOW_NS
 
@@ -101,20 +101,15 @@ class Monitor:
         self.digest: int | None = None
         for bound in deployment.inputs():
             self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
-        for axis in deployment.axes.values():
-            message = axis.valve_message
-            key = axis.valve.message.key
-            self.messages.setdefault(key, MessageRate(message.name, message.cycle_time))
-            if axis.status:
-                self._status(axis.status.message.key, axis.status.message.fields.message)
-        if deployment.status:
-            self._status(deployment.status.message.key, deployment.status.message.fields.message)
-        if identity := deployment.identity_status:
-            self._status(identity.message.key, identity.message.fields.message)
-
-    def _status(self, key: Key, message: object) -> None:
-        name, cycle = getattr(message, "name", ""), getattr(message, "cycle_time", None)
-        self.messages.setdefault(key, MessageRate(name, cycle))
+        sent: list[Any] = [
+            message
+            for axis in deployment.axes.values()
+            for message in (axis.valve.message, axis.status and axis.status.message)
+        ]
+        sent += [one and one.message for one in (deployment.status, deployment.identity_status)]
+        for message in filter(None, sent):
+            dbc = message.fields.message
+            self.messages.setdefault(message.key, MessageRate(dbc.name, dbc.cycle_time))
 
     def receive(self, frame: ReceivedFrame) -> None:
         """Take a frame that was received."""

@@ -68,7 +68,7 @@ class Eds:
         self.node = self._whole(_NODE, "NodeID", node) if node else None
 
     def objects(self, node: int) -> ObjectDictionary:
-        """The object dictionary of the node with this id.
+        """Return the object dictionary of the node with this id.
 
         Raises:
             ConfigError: the library cannot read it.

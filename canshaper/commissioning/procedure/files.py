@@ -36,17 +36,17 @@ class Files:
 
     @property
     def folder(self) -> Path:
-        """Logs, pictures and the report."""
+        """Folder of logs, pictures and the report."""
         return self._next("")
 
     @property
     def state(self) -> Path:
-        """How far it has come."""
+        """File of the state of the procedure."""
         return self._next(".json")
 
     @property
     def proposal(self) -> Path:
-        """A copy of the deployment file with what a step would write."""
+        """Copy of the deployment file with the change that a step proposes."""
         return self._next(".proposal.yaml")
 
     @contextmanager

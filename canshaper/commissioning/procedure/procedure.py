@@ -104,7 +104,7 @@ class Procedure:
     # -- what is there -------------------------------------------------------------------------
 
     def step(self, name: str) -> Step:
-        """A step by its name.
+        """Return the step with this name.
 
         Raises:
             UsageError: there is none, or this deployment has none.
@@ -224,7 +224,7 @@ class Procedure:
         write_state(self.files.state, self.state)
 
     def _reopen(self, changed: set[str], why: str) -> None:
-        """Open again what used something that has changed: results of steps, or the file."""
+        """Open the steps again that need something that has changed: steps, or the file."""
         for step in self.steps:
             record = self.state.of(step.name)
             if step.name not in changed and changed & {*step.needs}:

@@ -133,7 +133,7 @@ def made(control: Path, fault: Fault, deployment: Deployment) -> Row:
 
 
 def table(rows: Iterable[Row]) -> "Table":
-    """Faults that were rehearsed, as a table; it fits on A4 without the rows of the page."""
+    """Return the rehearsed faults as a table; without the column of claims it fits on A4."""
     heads = [one for one in HEADS if one != "row"]
     shown = new_table(*heads, title="Rehearsed faults")
     for row in rows:

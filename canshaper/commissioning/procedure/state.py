@@ -80,7 +80,7 @@ class State:
     steps: dict[str, Record] = field(default_factory=dict)
 
     def of(self, name: str) -> Record:
-        """The record of a step."""
+        """Return the record of a step; an empty one before it ran."""
         return self.steps.setdefault(name, Record())
 
 
@@ -96,7 +96,7 @@ def stamped(record: Record) -> Record:
 
 
 def hash_of(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     return sha256(path.read_bytes()).hexdigest()
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,13 +14,7 @@ from canshaper.codec.layout import Layout
 from canshaper.commissioning import suggest
 from canshaper.commissioning.doctor.joysticks import inputs_of
 from canshaper.commissioning.identification.canlog import read_can
-from canshaper.commissioning.identification.series import (
-    Array,
-    Command,
-    Kind,
-    Samples,
-    Series,
-)
+from canshaper.commissioning.identification.series import Array, Command, Kind, Samples, Series
 from canshaper.errors import IdentificationError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -56,7 +50,7 @@ class AxisTraffic:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Least and most of its joystick."""
+        """Least and largest demand of its joystick."""
         return min(self.joystick.value, default=0.0), max(self.joystick.value, default=0.0)
 
 
@@ -157,20 +151,28 @@ def possible_joysticks(deployment: Deployment) -> list[Message]:
     return own + [m for m in others if suggest.axes(m) and suggest.switches(m)]
 
 
-def read_traffic(log: Path, deployment: Deployment) -> Traffic:
-    """Read the traffic of a step from its log; its channels are those of the deployment.
+def _frames(log: Path, deployment: Deployment) -> Iterator[tuple[int, int, Frame]]:
+    """Yield the frames of a log with their time and that of the first one, ns.
 
-    Raises:
-        LogError: the log cannot be read.
+    Channels are those of the deployment; frames of others are left out.
     """
-    reader = _Reader(deployment)
     buses = {bus.channel: name for name, bus in deployment.config.buses.items()}
     first_ns: int | None = None
     for one in LogFile(log) if log.stat().st_size else ():  # nothing was on any bus
         first_ns = one.time_ns if first_ns is None else first_ns
         if bus := buses.get(one.channel):
-            frame = Frame(bus, one.can_id, one.extended, one.data)
-            reader.receive(frame, one.time_ns, (one.time_ns - first_ns) / 1e9)
+            yield one.time_ns, first_ns, Frame(bus, one.can_id, one.extended, one.data)
+
+
+def read_traffic(log: Path, deployment: Deployment) -> Traffic:
+    """Read the traffic of a step from its log.
+
+    Raises:
+        LogError: the log cannot be read.
+    """
+    reader = _Reader(deployment)
+    for time_ns, first_ns, frame in _frames(log, deployment):
+        reader.receive(frame, time_ns, (time_ns - first_ns) / 1e9)
     return reader.traffic
 
 
@@ -186,11 +188,8 @@ def simulated_recording(
         LogError: the log cannot be read.
     """
     recorder = Recorder(deployment, parameters)
-    buses = {bus.channel: name for name, bus in deployment.config.buses.items()}
-    for one in LogFile(log):
-        if bus := buses.get(one.channel):
-            frame = Frame(bus, one.can_id, one.extended, one.data)
-            recorder.receive(frame, one.time_ns / 1e9)
+    for time_ns, _, frame in _frames(log, deployment):
+        recorder.receive(frame, time_ns / 1e9)
     return recorder.recording()
 
 
@@ -248,9 +247,8 @@ def _check_complete(name: str, series: Series, duration_s: float) -> None:
 
 def _angle_deg(deployment: Deployment, name: str, series: Series, at_s: Array) -> list[float]:
     if series.unit.kind is Kind.OTHER:
-        text = (
-            f"{series.source}: expected an angle or its rate, got {series.unit.text or 'no unit'}"
-        )
+        got = series.unit.text or "no unit"
+        text = f"{series.source}: expected an angle or its rate, got {got}"
         raise IdentificationError(f"{name}: {text}; nothing else is compared in degrees")
     value = series.value - np.median(series.value)
     sway = deployment.axes[name].config.sway

@@ -33,8 +33,8 @@ MOST_GAIN = 3.0
 MODEL_DELAY_S = 0.01
 # Measurements so close to each other differ by noise, s: the swing hardly moves meanwhile.
 NOISE_S = 0.1
-# A pendulum whose length differs by more than this part is reported.
-SAME_LENGTH = 0.15
+# A pendulum whose length differs by more is reported, %.
+SAME_LENGTH_PCT = 15.0
 # An offset above this part of offset_max_deg raises that to so many times the offset.
 NEAR_OFFSET, MORE_OFFSET = 0.8, 1.5
 SIGMAS = 2.0  # of 95 %
@@ -62,23 +62,23 @@ class SensorFinding(AxisFinding):
 
     @property
     def unit(self) -> str:
-        """Unit for people."""
+        """Unit of swing and noise, for people."""
         return "degrees/s" if self.series.unit.kind is Kind.RATE else "degrees"
 
     @property
     def invert(self) -> bool:
-        """Whether it is negative where the tip speeds up in positive direction."""
+        """Whether the signal has the opposite sign of the model's swing."""
         return self.fit is not None and self.fit.gain < 0.0
 
     @property
     def delay_s(self) -> Value:
-        """Age of a measurement."""
+        """Age of a measurement when it is received, s."""
         assert self.fit
         return Value(self.fit.delay_s, math.hypot(SIGMAS * self.fit.deviations[0], MODEL_DELAY_S))
 
     @property
     def offset(self) -> Value:
-        """Degrees, or degrees per second, with the sign of its signal."""
+        """Offset in ``unit``, with the sign of the signal."""
         assert self.fit
         offsets = np.degrees(self.fit.offsets)
         spread = float(offsets.std(ddof=1)) if len(offsets) > 1 else 0.0
@@ -87,14 +87,14 @@ class SensorFinding(AxisFinding):
 
     @property
     def period_s(self) -> Value:
-        """Period of the damped swing."""
+        """Period of the damped swing, s."""
         assert self.fit
         period = 2.0 * math.pi / self.fit.omega
         return Value(period, SIGMAS * period * self.fit.deviations[1] / self.fit.omega)
 
     @property
     def size_m_s(self) -> Value:
-        """Full speed of the tip that makes as much swing as was measured."""
+        """Full speed of the tip that makes as much swing as was measured, m/s."""
         assert self.fit
         size = abs(self.fit.gain)
         return Value(size, SIGMAS * size * self.fit.deviations[3])
@@ -119,7 +119,13 @@ def examine(axis: BoundAxis, series: Series) -> SensorFinding:
     finding.fit = fit_sensor(finding.data, mode, config.valve_lag_ms / 1000.0)
     finding.noise = math.degrees(_noise(finding.data, finding.fit.fitted))
     finding.problems += _faults(axis, finding)
-    finding.notes += _notes(axis, finding)
+    longer_pct = 100.0 * ((finding.period_s.value / mode.period_s) ** 2 - 1.0)
+    if abs(longer_pct) > SAME_LENGTH_PCT:
+        finding.notes.append(
+            f"it swings like a pendulum {abs(longer_pct):.0f} %"
+            f" {'longer' if longer_pct > 0 else 'shorter'} than the file says; canshaper identify"
+            " finds what it is"
+        )
     return finding
 
 
@@ -205,20 +211,6 @@ def _faults(axis: BoundAxis, finding: SensorFinding) -> list[str]:
             f" {1000 * finding.delay_s.value:.0f} ms: take a quicker sensor, or cycle"
         )
     return faults
-
-
-def _notes(axis: BoundAxis, finding: SensorFinding) -> list[str]:
-    """Return further notes for the person."""
-    assert finding.fit and axis.config.sway
-    notes, period_s = [], axis.config.sway.mode().period_s
-    longer = (finding.period_s.value / period_s) ** 2 - 1.0
-    if abs(longer) > SAME_LENGTH:
-        notes.append(
-            f"it swings like a pendulum {abs(100 * longer):.0f} %"
-            f" {'longer' if longer > 0 else 'shorter'} than the file says; canshaper identify finds"
-            " what it is"
-        )
-    return notes
 
 
 def changes(axis: BoundAxis, finding: SensorFinding) -> dict[str, FileValue]:

@@ -16,7 +16,7 @@ from canshaper.design.tuning.evaluate import Machine, ShaperFor, evaluate, shape
 from canshaper.design.tuning.formulation import MOST_DAMPED, longest_tail_s
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import every_filter
-from canshaper.machine.stopping import output_limits, when
+from canshaper.machine.stop_distance import output_limits, when
 from canshaper.shaping.sway import SwayMode
 
 # Parts of the swing: a good filter leaves up to GOOD; one that leaves more than USELESS is refused.

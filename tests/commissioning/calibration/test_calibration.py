@@ -168,27 +168,6 @@ def test_it_does_not_begin_with_feedback_of_long_ago(deployment: Deployment) -> 
     assert (drive.waiting_for, drive.ended) == ("feedback", "")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["--axis", "boom"], "expected an axis, got 'boom'; there are slew, near_far, lift"),
-        (
-            ["--axis", "slew", "--speed", "TipVelocity.Rate"],
-            "expected a signal of TipVelocity, got 'Rate'",
-        ),
-        (
-            ["--axis", "slew", "--speed", "Tip.Rate"],
-            "expected a message of the DBC files, got 'Tip'; there are",
-        ),
-        (["--axis", "slew", "--speed", "Rate"], "--speed: expected MESSAGE.SIGNAL, got Rate"),
-    ],
-)
-def test_wrong_options_are_reported(arguments: list[str], says: str) -> None:
-    reported = CliRunner().invoke(app, ["calibrate", str(FILE), *arguments])
-    assert reported.exit_code == 2
-    assert says in reported.output
-
-
 @pytest.mark.slow
 def test_a_signal_that_is_none_of_the_axis_is_reported(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "VerticalSpeed"), RAMP)

@@ -1,6 +1,7 @@
 """Whose speed a measurement listens to: one bus, one sender, numbers that are speeds."""
 
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -59,14 +60,27 @@ def drive_on(
     ticks: int = 400,
 ) -> CalibrationDrive:
     """Joysticks held in neutral with their enable; the speed is ``feedback``, the last for ever."""
-    drive, hand = CalibrationDrive(deployment, axis, speed, RAMP), Hand(deployment)
-    for tick in range(ticks):
-        now_ns = tick * TICK_NS
-        for frame in hand.frames(tick * 20, Held({}, enable=True)):
-            drive.receive(frame, now_ns)
-        list(drive.tick(now_ns))
-        drive.receive(feedback[min(tick, len(feedback) - 1)], now_ns)
+    drive = CalibrationDrive(deployment, axis, speed, RAMP)
+    sent_by(drive, deployment, feedback, range(ticks))
     return drive
+
+
+def sent_by(
+    drive: CalibrationDrive,
+    deployment: Deployment,
+    feedback: list[Frame],
+    ticks: range,
+    moved: Callable[[int], dict[str, float]] = lambda _tick: {},
+) -> list[dict[int, int]]:
+    """First byte of the valve frames of each tick, by id; joysticks moved by number of the tick."""
+    hand, sent = Hand(deployment), []
+    for tick in ticks:
+        now_ns = tick * TICK_NS
+        for frame in hand.frames(tick * 20, Held(moved(tick), enable=True)):
+            drive.receive(frame, now_ns)
+        sent.append({frame.can_id: frame.data[0] for frame in drive.tick(now_ns)})
+        drive.receive(feedback[min(tick, len(feedback) - 1)], now_ns)
+    return sent
 
 
 @pytest.mark.parametrize(("bus", "begins"), [("front", True), ("rear", False)])
@@ -123,28 +137,20 @@ def test_messages_that_cannot_be_measured_with(tmp_path: Path, message: str, why
 def test_the_joystick_of_another_axis_ends_it_and_moves_nothing() -> None:
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
-    hand, sent = Hand(deployment), []
-    for tick in range(300):
-        joysticks = {"near_far": 1.0} if tick > 200 else {}
-        for frame in hand.frames(tick * 20, Held(joysticks, enable=True)):
-            drive.receive(frame, tick * TICK_NS)
-        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
-        sent += [f for f in drive.tick(tick * TICK_NS) if f.can_id in (0x200, 0x201)]
+    still = [Frame("crane", 0x402, False, bytes(6))]
+    sent = sent_by(drive, deployment, still, range(300), lambda n: {"near_far": float(n > 200)})
     assert drive.ended == "stopped: the joystick of near_far was moved"
-    assert any(f.data[0] for f in sent if f.can_id == 0x200)
-    assert not any(f.data[0] for f in sent if f.can_id == 0x201)
-    assert [f.data[0] for f in sent[-40:]] == [0] * 40
+    assert any(tick[0x200] for tick in sent)
+    assert not any(tick[0x201] for tick in sent)
+    assert not any(tick[0x200] for tick in sent[-20:])
 
 
 def test_it_waits_for_every_joystick() -> None:
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
-    hand = Hand(deployment)
-    for tick in range(100):
-        for frame in hand.frames(tick * 20, Held({"near_far": 1.0}, enable=True)):
-            drive.receive(frame, tick * TICK_NS)
-        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
-        assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id in (0x200, 0x201))
+    still = [Frame("crane", 0x402, False, bytes(6))]
+    sent = sent_by(drive, deployment, still, range(100), lambda _tick: {"near_far": 1.0})
+    assert not any(tick[0x200] or tick[0x201] for tick in sent)
     assert drive.waiting_for == "the joystick of near_far"
 
 
@@ -196,7 +202,7 @@ def test_a_speed_may_be_in_a_frame_of_can_fd(tmp_path: Path, length: int, good: 
         CalibrationDrive(deployment, "slew", ("Long", "Speed"), RAMP)
 
 
-JOINTS = Path(__file__).parents[3] / "config" / "forwarder-joints.yaml"
+JOINTS = ROOT / "config" / "forwarder-joints.yaml"
 
 
 def of_joint(axis: str, ramp: Ramp) -> CalibrationDrive:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.commissioning.calibration.pump import Direction, Moment, measured, pump_lines
+from canshaper.commissioning.calibration.pump import Moment, PumpFlow, measured, pump_lines
 from canshaper.commissioning.calibration.ramp import TOGETHER_PER_S, Ramp
 from canshaper.config.section import Origin
 from canshaper.edit.edit import written_by
@@ -73,7 +73,7 @@ def drive(
     return moments
 
 
-def directions_of(moments: list[Moment]) -> list[Direction]:
+def directions_of(moments: list[Moment]) -> list[PumpFlow]:
     return measured([moments], AXES, ONE)
 
 

@@ -15,10 +15,10 @@ from canshaper.commissioning.procedure.bench import log_simulated
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.hand import Hand, Held
 from canshaper_sim.operator import Script, Stroke
 from canshaper_sim.parameters import changed_parameters
 from tests.cli.invocation import invoke
+from tests.commissioning.calibration.test_speed import sent_by
 from tests.commissioning.calibration.test_together import (
     AXES,
     SPEEDS,
@@ -35,15 +35,14 @@ RAMP = Ramp(rate_per_s=1.0, top=0.2, rest_s=0.5)
 def sent(deployment: Deployment, moved_s: float = math.inf) -> tuple[CalibrationDrive, list[Any]]:
     """Frames of slew, near-far and lift, tick by tick; near-far's joystick is moved at a time."""
     drive = CalibrationDrive(deployment, "slew", SPEEDS["slew"], RAMP, {AXES[1]: SPEEDS[AXES[1]]})
-    hand, ticks = Hand(deployment), []
-    for tick in range(round(drive.duration_s / TICK_S) + 60):
-        joysticks = {"near_far": 0.5} if tick * TICK_S >= moved_s else {}
-        for frame in hand.frames(tick * 20, Held(joysticks, enable=True)):
-            drive.receive(frame, tick * 20_000_000)
-        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * 20_000_000)
-        frames = {frame.can_id: frame.data[0] for frame in drive.tick(tick * 20_000_000)}
-        ticks.append([frames[can_id] for can_id in (0x200, 0x201, 0x202)])
-    return drive, ticks
+    last = round(drive.duration_s / TICK_S) + 60
+    still = [Frame("crane", 0x402, False, bytes(6))]
+
+    def moved(tick: int) -> dict[str, float]:
+        return {"near_far": 0.5} if tick * TICK_S >= moved_s else {}
+
+    ticks = sent_by(drive, deployment, still, range(last), moved)
+    return drive, [[frames[can_id] for can_id in (0x200, 0x201, 0x202)] for frames in ticks]
 
 
 def test_each_is_driven_alone_and_then_both() -> None:
@@ -111,6 +110,16 @@ def test_simulated_pumps_are_told_apart(name: str, changes: list[str], says: str
 @pytest.mark.parametrize(
     ("options", "says"),
     [
+        (("--axis", "boom"), "expected an axis, got 'boom'; there are slew, near_far, lift"),
+        (
+            ("--axis", "slew", "--speed", "TipVelocity.Rate"),
+            "expected a signal of TipVelocity, got",
+        ),
+        (
+            ("--axis", "slew", "--speed", "Tip.Rate"),
+            "expected a message of the DBC files, got 'Tip'",
+        ),
+        (("--axis", "slew", "--speed", "Rate"), "--speed: expected MESSAGE.SIGNAL, got Rate"),
         ((), "--axis: expected one, or two with --together, got none"),
         (("--axis", "slew", "--axis", "lift"), "or two with --together, got slew, lift"),
         (("--together", "--axis", "slew"), "--together: expected two axes, got slew; there are"),

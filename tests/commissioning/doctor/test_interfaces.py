@@ -8,13 +8,12 @@ behind a serial line on which an adapter reported warning, passive and bus-off.
 import json
 import socket
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from canshaper.bus.port import not_opened
 from canshaper.commissioning.doctor import interfaces
-from canshaper.commissioning.doctor.devices import parse_ip, read_link, read_sys
+from canshaper.commissioning.doctor.devices import Link, parse_ip, read_link, read_sys
 from canshaper.commissioning.doctor.interfaces import bus_findings, link_findings
 from canshaper.commissioning.doctor.verdict import Finding, Level
 from canshaper.config.bus import Bus
@@ -27,75 +26,43 @@ def bus(channel: str, bitrate: int | None = None) -> Bus:
     return Bus(interface="socketcan", channel=channel, bitrate=bitrate)
 
 
-def findings(file: str, channel: str, bitrate: int | None = None) -> dict[str, Finding]:
-    link = parse_ip((IP / f"{file}.json").read_text())
+def link_of(file: str, old: str = "", new: str = "") -> Link:
+    """The interface of a file of ``ip/``, with a part of it replaced."""
+    text = (IP / f"{file}.json").read_text()
+    assert old in text
+    link = parse_ip(text.replace(old, new) if old else text)
     assert link is not None
-    assert link.name == channel
-    return {f.subject: f for f in link_findings(link, bus(channel, bitrate))}
+    return link
+
+
+def findings(file: str, bitrate: int | None = None) -> dict[str, Finding]:
+    link = link_of(file)
+    return {f.subject: f for f in link_findings(link, bus(link.name, bitrate))}
+
+
+GOOD = dict.fromkeys(("", " bit rate", " queue", " state", " errors", " restart", " modes"), OK)
+SLCAN = GOOD | {" restart": WARNING, " send confirmation": BAD}
+DOWN = {"": BAD, " bit rate": OK, " queue": OK, " restart": WARNING, " modes": OK}
 
 
 @pytest.mark.parametrize(
     ("file", "channel", "levels"),
     [
-        (
-            "can1-good",
-            "can1",
-            {"": OK, " bit rate": OK, " queue": OK, " state": OK, " errors": OK, " restart": OK}
-            | {" modes": OK},
-        ),
-        (
-            "can0-restart-0",
-            "can0",
-            {"": OK, " bit rate": OK, " queue": OK, " state": OK, " errors": OK}
-            | {" restart": WARNING, " modes": OK},
-        ),
-        (
-            "can1-one-shot-long-queue",
-            "can1",
-            {"": OK, " bit rate": OK, " queue": WARNING, " state": OK, " errors": OK}
-            | {" restart": OK, " modes": WARNING},
-        ),
-        (
-            "can1-listen-only",
-            "can1",
-            {"": OK, " bit rate": OK, " queue": OK, " state": OK, " errors": OK, " restart": OK}
-            | {" modes": BAD},
-        ),
-        (
-            "can1-down",
-            "can1",
-            {"": BAD, " bit rate": OK, " queue": OK, " restart": WARNING, " modes": OK},
-        ),
-        (
-            "slcan-active",
-            "can2",
-            {"": OK, " bit rate": OK, " queue": OK, " state": OK, " errors": OK}
-            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
-        ),
-        (
-            "slcan-warning",
-            "can2",
-            {"": OK, " bit rate": OK, " queue": OK, " state": WARNING, " errors": OK}
-            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
-        ),
-        (
-            "slcan-passive",
-            "can2",
-            {"": OK, " bit rate": OK, " queue": OK, " state": BAD, " errors": WARNING}
-            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
-        ),
-        (
-            "slcan-bus-off",
-            "can2",
-            {"": OK, " bit rate": OK, " queue": OK, " state": BAD, " errors": WARNING}
-            | {" restart": WARNING, " modes": OK, " send confirmation": BAD},
-        ),
+        ("can1-good", "can1", GOOD),
+        ("can0-restart-0", "can0", GOOD | {" restart": WARNING}),
+        ("can1-one-shot-long-queue", "can1", GOOD | {" queue": WARNING, " modes": WARNING}),
+        ("can1-listen-only", "can1", GOOD | {" modes": BAD}),
+        ("can1-down", "can1", DOWN),
+        ("slcan-active", "can2", SLCAN),
+        ("slcan-warning", "can2", SLCAN | {" state": WARNING}),
+        ("slcan-passive", "can2", SLCAN | {" state": BAD, " errors": WARNING}),
+        ("slcan-bus-off", "can2", SLCAN | {" state": BAD, " errors": WARNING}),
         ("vcan0", "vcan0", {"": NOTE}),
         ("lo", "lo", {"": BAD}),
     ],
 )
 def test_levels(file: str, channel: str, levels: dict[str, Level]) -> None:
-    by_subject = findings(file, channel)
+    by_subject = findings(file)
     assert {s: f.level for s, f in by_subject.items()} == {
         channel + s: v for s, v in levels.items()
     }
@@ -103,22 +70,22 @@ def test_levels(file: str, channel: str, levels: dict[str, Level]) -> None:
 
 
 def test_what_is_said() -> None:
-    assert findings("can1-good", "can1")["can1 bit rate"].found == "250000 bit/s"
-    assert findings("slcan-active", "can2")["can2 bit rate"].found == "250000 bit/s"
-    assert "100 frames" in findings("can1-one-shot-long-queue", "can1")["can1 queue"].found
-    assert "one-shot" in findings("can1-one-shot-long-queue", "can1")["can1 modes"].found
-    assert "listen-only off" in findings("can1-listen-only", "can1")["can1 modes"].remedy
-    off = findings("slcan-bus-off", "can2")
+    assert findings("can1-good")["can1 bit rate"].found == "250000 bit/s"
+    assert findings("slcan-active")["can2 bit rate"].found == "250000 bit/s"
+    assert "100 frames" in findings("can1-one-shot-long-queue")["can1 queue"].found
+    assert "one-shot" in findings("can1-one-shot-long-queue")["can1 modes"].found
+    assert "listen-only off" in findings("can1-listen-only")["can1 modes"].remedy
+    off = findings("slcan-bus-off")
     assert "run drives no valve" in off["can2 send confirmation"].found
     assert "restart-ms" not in off["can2 restart"].remedy
     assert "bus-off" in off["can2 state"].found
     assert off["can2 errors"].found == "counted: bus-off 1, passive 1"
-    assert "bitrate 250000 restart-ms 100" in findings("can1-down", "can1")["can1"].remedy
+    assert "bitrate 250000 restart-ms 100" in findings("can1-down")["can1"].remedy
 
 
 def test_the_bit_rate_of_the_file_must_be_that_of_the_interface() -> None:
-    same = findings("can1-good", "can1", 250_000)["can1 bit rate"]
-    other = findings("can1-good", "can1", 500_000)["can1 bit rate"]
+    same = findings("can1-good", 250_000)["can1 bit rate"]
+    other = findings("can1-good", 500_000)["can1 bit rate"]
     assert same.level is OK
     assert other.level is BAD
     assert other.found == "250000 bit/s, in the file 500000 bit/s"
@@ -128,25 +95,19 @@ def test_the_bit_rate_of_the_file_must_be_that_of_the_interface() -> None:
     ("queue", "level"), [(9, WARNING), (10, OK), (16, OK), (20, OK), (21, WARNING)]
 )
 def test_queue_limits(queue: int, level: Level) -> None:
-    text = (IP / "can1-good.json").read_text().replace('"txqlen":16', f'"txqlen":{queue}')
-    link = parse_ip(text)
-    assert link is not None
+    link = link_of("can1-good", '"txqlen":16', f'"txqlen":{queue}')
     assert interfaces.queue(link).level is level
 
 
 def test_error_counters_of_the_controller_are_reported() -> None:
-    text = (IP / "can1-good.json").read_text()
-    text = text.replace('"berr_counter":{"tx":0,"rx":0}', '"berr_counter":{"tx":8,"rx":0}')
-    link = parse_ip(text)
-    assert link is not None
-    finding = interfaces.errors(link)
+    finding = interfaces.errors(link_of("can1-good", '"tx":0,"rx":0', '"tx":8,"rx":0'))
     assert finding is not None
     assert (finding.level, finding.found) == (WARNING, "counted: tx 8")
 
 
 def test_a_virtual_bus_that_is_down() -> None:
-    text = (IP / "vcan0.json").read_text().replace('["NOARP","UP","LOWER_UP"]', '["NOARP"]')
-    (finding,) = link_findings(parse_ip(text), bus("vcan0"))
+    link = link_of("vcan0", '["NOARP","UP","LOWER_UP"]', '["NOARP"]')
+    (finding,) = link_findings(link, bus("vcan0"))
     assert (finding.level, finding.found) == (BAD, "is down")
 
 
@@ -214,17 +175,13 @@ def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "modprobe can_raw" in finding.remedy
 
 
-def fd_findings(file: str, channel: str, **options: Any) -> dict[str, Finding]:
-    link = parse_ip((IP / f"{file}.json").read_text())
-    assert link is not None
-    config = Bus(interface="socketcan", channel=channel, fd=True, **options)
+def of_fd(link: Link, **rates: int | None) -> dict[str, Finding]:
+    config = Bus(interface="socketcan", channel=link.name, fd=True, **rates)  # type: ignore[arg-type]
     return {f.subject: f for f in link_findings(link, config)}
 
 
 def test_a_controller_without_can_fd() -> None:
-    finding = fd_findings("can1-good", "can1", bitrate=250_000, data_bitrate=1_000_000)[
-        "can1 CAN FD"
-    ]
+    finding = of_fd(link_of("can1-good"), bitrate=250_000, data_bitrate=1_000_000)["can1 CAN FD"]
     assert (finding.level, finding.found) == (BAD, "off, the MTU is 16")
     options = "type can dbitrate 1000000 fd on"
     assert finding.remedy == f"with can1 down: sudo ip link set can1 {options}"
@@ -239,8 +196,8 @@ def test_a_virtual_bus_with_and_without_can_fd(mtu: int, level: Level, remedy: s
     link = parse_ip(text + ' {"info_kind": "vcan"}}]')
     assert link is not None
     assert [f.subject for f in link_findings(link, bus("vcan0"))] == ["vcan0"]
-    _, finding = link_findings(link, Bus(interface="socketcan", channel="vcan0", fd=True))
-    assert (finding.subject, finding.level, finding.remedy) == ("vcan0 CAN FD", level, remedy)
+    finding = of_fd(link)["vcan0 CAN FD"]
+    assert (finding.level, finding.remedy) == (level, remedy)
 
 
 @pytest.mark.parametrize(
@@ -261,15 +218,10 @@ def test_the_bit_rate_of_the_data_is_that_of_the_file(
     one["linkinfo"]["info_data"]["data_bittiming"] = {"bitrate": 2_000_000}
     link = parse_ip(json.dumps(entry))
     assert link is not None
-    config = Bus(interface="socketcan", channel="can1", fd=True, data_bitrate=data_bitrate)
-    finding = {f.subject: f for f in link_findings(link, config)}["can1 CAN FD"]
+    finding = of_fd(link, data_bitrate=data_bitrate)["can1 CAN FD"]
     assert (finding.level, finding.found) == (level, text)
 
 
 def test_a_controller_of_can_fd_that_is_down_is_set_up_with_its_rates() -> None:
-    link = parse_ip((IP / "can1-down.json").read_text())
-    assert link is not None
-    options = {"bitrate": 500_000, "data_bitrate": 2_000_000}
-    config = Bus(interface="socketcan", channel=link.name, fd=True, **options)
-    finding = link_findings(link, config)[0]
+    finding = of_fd(link_of("can1-down"), bitrate=500_000, data_bitrate=2_000_000)["can1"]
     assert "dbitrate 2000000 fd on restart-ms 100" in finding.remedy

@@ -1,6 +1,6 @@
 """The view of the monitor: in 80 columns and 24 lines, and never by colour alone."""
 
-import math
+import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,6 +58,19 @@ def status_frames(
     return [*frames, received(status_frame(deployment.status, COUNTERS), time_ns)]
 
 
+def monitor_of(
+    deployment: Deployment,
+    time_ns: int = NOW,
+    state: State = State.ACTIVE,
+    reason: Reason = Reason.JOYSTICK_MOVED,
+) -> Monitor:
+    """A monitor that has received these status messages."""
+    monitor = Monitor(deployment)
+    for frame in status_frames(deployment, time_ns, state, reason):
+        monitor.receive(frame)
+    return monitor
+
+
 def j1939(source: str, folder: Path) -> Deployment:
     """The machine of J1939, its left joystick with another line."""
     joystick = "    message: BJM1\n"
@@ -78,21 +91,14 @@ def test_a_joystick_of_j1939_is_known_at_every_priority(tmp_path: Path, source: 
 
 def text(monitor: Monitor, now_ns: int, width: int = 80, height: int = 24) -> list[str]:
     """The picture as a terminal without colours shows it."""
-    console = Console(width=width, height=height, no_color=True, record=True, file=open_null())
+    file = io.StringIO()
+    console = Console(width=width, height=height, no_color=True, record=True, file=file)
     console.print(screen(monitor, now_ns, width, height, plain=False))
     return console.export_text().splitlines()
 
 
-def open_null() -> "object":
-    import io
-
-    return io.StringIO()
-
-
 def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
-    monitor = Monitor(deployment)
-    for frame in status_frames(deployment):
-        monitor.receive(frame)
+    monitor = monitor_of(deployment)
     lines = text(monitor, NOW + 100 * MS)
     assert lines[1].startswith(
         "slew        ACTIVE                 input ··········│█████·····  +50%"
@@ -127,9 +133,7 @@ def test_before_anything_is_received_it_says_so(deployment: Deployment) -> None:
 
 
 def test_what_is_stale_says_stale(deployment: Deployment) -> None:
-    monitor = Monitor(deployment)
-    for frame in status_frames(deployment):
-        monitor.receive(frame)
+    monitor = monitor_of(deployment)
     fresh = "\n".join(text(monitor, NOW + 290 * MS))
     assert "STALE" not in fresh
     lines = text(monitor, NOW + 2_500 * MS)
@@ -142,13 +146,8 @@ def test_what_is_stale_says_stale(deployment: Deployment) -> None:
 def test_rates_stand_next_to_those_of_the_dbc(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for i in range(200):
-        monitor.receive(
-            ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x110, False, bytes(8), "")
-        )
-        if i % 2:
-            monitor.receive(
-                ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x111, False, bytes(8), "")
-            )
+        for can_id in (0x110, 0x111) if i % 2 else (0x110,):
+            monitor.receive(received(Frame("crane", can_id, False, bytes(8)), NOW + i * 20 * MS))
     lines = "\n".join(text(monitor, NOW + 199 * 20 * MS))
     assert "JoystickLeft 50 (50)  " in lines
     assert "JoystickRight 25 (50) SLOW" in lines
@@ -157,9 +156,7 @@ def test_rates_stand_next_to_those_of_the_dbc(deployment: Deployment) -> None:
 
 
 def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
-    monitor = Monitor(deployment)
-    for frame in status_frames(deployment, state=State.READY, reason=Reason.JOYSTICK_NEUTRAL):
-        monitor.receive(frame)
+    monitor = monitor_of(deployment, state=State.READY, reason=Reason.JOYSTICK_NEUTRAL)
     for frame in status_frames(deployment, NOW + 100 * MS, State.TRIPPED, Reason.ENABLE_LOST):
         monitor.receive(frame)
     lines = "\n".join(text(monitor, NOW + 200 * MS))
@@ -171,10 +168,8 @@ def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
 def test_frames_that_are_none_of_its_messages(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     monitor.receive(ReceivedFrame(NOW, "crane", "vcan0", 0x20000080, True, bytes(8), "error"))
-    monitor.receive(ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\x01", ""))  # too short
-    monitor.receive(
-        ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\xff" * 8, "")
-    )  # unknown numbers
+    for data in (b"\x01", b"\xff" * 8):  # too short, unknown numbers
+        monitor.receive(received(Frame("crane", 0x300, False, data), NOW))
     for frame in status_frames(deployment)[1:]:
         monitor.receive(frame)
     lines = "\n".join(text(monitor, NOW))
@@ -200,14 +195,11 @@ def test_a_bar_shows_side_and_size() -> None:
 
 
 def test_a_line_for_pipes(deployment: Deployment) -> None:
-    monitor = Monitor(deployment)
-    for frame in status_frames(deployment):
-        monitor.receive(frame)
+    monitor = monitor_of(deployment)
     line = status_line(monitor, NOW)
     assert "slew=ACTIVE(JOYSTICK_MOVED) raw=+50% sent=-25% sway=+3.4deg" in line
     assert "missed=3" in line
     assert "crane=2/s" in line
-    assert not math.isnan(float(line.split("sway=")[1].split("deg")[0]))
 
 
 def drive(deployment: Deployment, monitor: Monitor) -> None:
@@ -243,9 +235,7 @@ def test_a_line_over_time_keeps_short_peaks_and_leaves_out_what_did_not_come() -
 
 
 def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
-    monitor = Monitor(deployment)
-    for frame in status_frames(deployment, state=State.TRIPPED, reason=Reason.ENABLE_LOST):
-        monitor.receive(frame)
+    monitor = monitor_of(deployment, state=State.TRIPPED, reason=Reason.ENABLE_LOST)
     monitor.note(NOW, "axis=slew state=TRIPPED from=ACTIVE reason=ENABLE_LOST")
     rows = text(monitor, NOW, width=40, height=60)
     assert max(map(len, rows)) <= 40
@@ -257,9 +247,7 @@ def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
 
 
 def test_keys_pause_choose_an_axis_and_end(deployment: Deployment) -> None:
-    monitor, keys = Monitor(deployment), Keys([*deployment.axes])
-    for frame in status_frames(deployment):
-        monitor.receive(frame)
+    monitor, keys = monitor_of(deployment), Keys([*deployment.axes])
     monitor.note(NOW, "axis=lift state=READY from=ACTIVE reason=AT_REST")
 
     def shown() -> list[str]:

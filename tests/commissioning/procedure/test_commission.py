@@ -1,6 +1,5 @@
 """``canshaper commission --simulated``: state, resumption, and what must not get lost."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +14,10 @@ from canshaper.commissioning.procedure.procedure import Procedure
 from canshaper.commissioning.procedure.state import Status, read_state
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
+from tests.commissioning.procedure.rehearsal import COPY, STATE, commission, steps
 from tests.rigs.files import text_of
 
-COPY = Path("machine.rehearsal.yaml")
-STATE = Path("machine.rehearsal.commission.json")
 CRANE = ("--set", "grapple.l2_m=1.55")
-
-
-def commission(*words: str, answers: str = "", code: int = 0) -> str:
-    arguments = ["commission", "machine.yaml", "--simulated", *words]
-    result = CliRunner().invoke(app, arguments, input=answers)
-    assert result.exit_code == code, result.output
-    return result.output
-
-
-def steps() -> Any:
-    return json.loads(STATE.read_text())["steps"]
 
 
 def procedure(changes: list[str] | None = None) -> Procedure:

@@ -1,32 +1,16 @@
 """The step of the filter: the robust one and the paper's side by side, and what a person chose."""
 
-import json
 import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.commissioning.procedure.state import Outcome, State
 from canshaper.commissioning.procedure.steps.filter import FILTER
 from canshaper.machine.binding import load_deployment
-
-STATE = Path("machine.rehearsal.commission.json")
-COPY = Path("machine.rehearsal.yaml")
-
-
-def step(*words: str, answers: str = "") -> str:
-    arguments = ["commission", "machine.yaml", "--simulated", "--step", *words]
-    result = CliRunner().invoke(app, arguments, input=answers)
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
-def numbers() -> Any:
-    return json.loads(STATE.read_text())["steps"]["filter"]["numbers"]
+from tests.commissioning.procedure.rehearsal import COPY, FOLDER, commission, steps
 
 
 def kinds() -> set[str]:
@@ -58,13 +42,13 @@ def slow_valve(machine: Path) -> None:
 
 @pytest.mark.slow
 def test_what_a_person_chose_is_written_and_kept(machine: Path) -> None:
-    shown = step("filter", answers="gff\n\n")
+    shown = commission("--step", "filter", answers="gff\n\n")
     question, *figures = re.findall(r"^(?:filter: which|  \w+, (?:robust|gff):).*$", shown, re.M)
     assert question == "filter: which one, robust or gff; recommended is robust"
     assert len(figures) == 4
     assert all("run-on" in line and line.endswith("; good") for line in figures)
     assert kinds() == {"gff"}
-    kept = numbers()
+    kept = steps()["filter"]["numbers"]
     assert (kept["chosen"], kept["recommended"]) == ("gff", "robust")
     assert kept["offered"] == ["robust", "gff"]
     for name in ("slew", "near_far"):
@@ -72,10 +56,10 @@ def test_what_a_person_chose_is_written_and_kept(machine: Path) -> None:
         assert robust["dip_pct"] < 1.0 < gff["dip_pct"]
         assert robust["peak_deg"] < 0.5 * robust["raw_peak_deg"]
         assert gff["raw_peak_deg"] == robust["raw_peak_deg"]
-    again = step("filter", "--yes")  # what was chosen before is the default
+    again = commission("--step", "filter", "--yes")  # what was chosen before is the default
     assert "Recommended: robust. Chosen: gff" in again
-    step("report", "--yes")
-    report = (COPY.parent / "machine.rehearsal.commission" / "report.html").read_text("utf-8")
+    commission("--step", "report", "--yes")
+    report = (FOLDER / "report.html").read_text("utf-8")
     assert "Recommended: robust. Chosen: gff" in report
     assert "gff, of the paper" in report
 

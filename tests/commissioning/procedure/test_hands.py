@@ -53,6 +53,14 @@ def none(_one: Stroke) -> list[Stroke]:
     return []
 
 
+def one_sided(one: Stroke) -> list[Stroke]:
+    return [replace(one, level=abs(one.level))]
+
+
+def only_slew(one: Stroke) -> list[Stroke]:
+    return [one] if one.axis == "slew" else []
+
+
 def both(one: Stroke) -> list[Stroke]:
     return [replace(one, axis="slew"), replace(one, axis="near_far")]
 
@@ -75,36 +83,44 @@ def test_joysticks_moved_otherwise(machine: Path, change: Any, text: str) -> Non
     assert machine.read_bytes() == before
 
 
-@pytest.mark.slow
-def test_joysticks_without_enable(machine: Path) -> None:
-    outcome = run(machine, "joysticks", lambda task: replace(task, released=(0.0, 9.0)))
-    assert outcome.problems[0].startswith("slew: the enable switch was not seen held")
+def released(*times_s: float) -> Any:
+    return lambda task: replace(task, released=times_s or None)
+
+
+EVERY = ["slew", "near_far", "lift"]
 
 
 @pytest.mark.slow
-def test_a_dry_drive_without_one_axis(machine: Path) -> None:
-    outcome = run(machine, "dry", strokes(lambda one: [one] if one.axis == "slew" else []))
-    assert [fault.partition(":")[0] for fault in outcome.problems] == ["near_far", "lift"]
-
-
-@pytest.mark.slow
-def test_a_dry_drive_without_enable(machine: Path) -> None:
-    outcome = run(machine, "dry", lambda task: replace(task, released=(0.0, 100.0)))
-    assert "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_OFF)" in outcome.problems[0]
-
-
-@pytest.mark.slow
-def test_a_first_motion_to_one_side(machine: Path) -> None:
-    change = strokes(lambda one: [replace(one, level=abs(one.level))])
-    outcome = run(machine, "motion", change)
-    assert {fault.partition(":")[0] for fault in outcome.problems} == {"slew", "near_far", "lift"}
-    assert "its valve did not follow its joystick in both directions" in outcome.problems[0]
+@pytest.mark.parametrize(
+    ("step", "change", "axes", "text"),
+    [
+        ("joysticks", released(0.0, 9.0), EVERY, "slew: the enable switch was not seen held"),
+        ("dry", strokes(only_slew), EVERY[1:], "near_far: its joystick went from"),
+        (
+            "dry",
+            released(0.0, 100.0),
+            EVERY,
+            "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_",
+        ),
+        (
+            "motion",
+            strokes(one_sided),
+            EVERY,
+            "slew: its valve did not follow its joystick in both",
+        ),
+    ],
+)
+def test_a_step_done_otherwise(
+    machine: Path, step: str, change: Any, axes: list[str], text: str
+) -> None:
+    problems = run(machine, step, change).problems
+    assert problems[0].startswith(text)
+    assert [*dict.fromkeys(fault.partition(":")[0] for fault in problems)] == axes
 
 
 @pytest.mark.slow
 def test_a_first_motion_with_the_enable_held_all_the_time(machine: Path) -> None:
-    outcome = run(machine, "motion", lambda task: replace(task, released=None))
-    assert outcome.problems == [
+    assert run(machine, "motion", released()).problems == [
         "the enable was not let go while an axis moved, or is in no message of a joystick: let it"
         " go in motion; neutral has to follow at once"
     ]
@@ -192,35 +208,20 @@ axes:
     machine.write_text(text.replace("\naxes:\n", joystick))
 
 
-class Listening(Renamed):
-    """Keeps what the person is asked to do."""
-
-    def __init__(self) -> None:
-        super().__init__({"slew": "slew", "near_far": "near_far", "lift": "lift"})
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("step", ["buses", "joysticks", "swing", "dry", "motion", "drive"])
-def test_each_step_says_how_long_it_records(machine: Path, step: str) -> None:
-    bench = Listening()
+def test_a_person_reads_how_long_it_records_and_who_may_move_the_crane(
+    machine: Path, step: str
+) -> None:
+    """In joysticks and dry the controller of before may."""
+    bench = Renamed({"slew": "slew", "near_far": "near_far", "lift": "lift"})
     one = Procedure(Files(machine), bench, load_deployment, origin=machine)
     one.run(one.step(step))
     assert bench.tasks
     for task in bench.tasks:
         assert f" {task.script.duration_s:.0f} s" in task.words
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("step", ["joysticks", "dry"])
-def test_where_the_old_controller_may_move_the_crane_the_person_is_warned(
-    machine: Path, step: str
-) -> None:
-    bench = Listening()
-    one = Procedure(Files(machine), bench, load_deployment, origin=machine)
-    one.run(one.step(step))
-    for task in bench.tasks:
-        assert "the controller of before moves the crane wherever it is connected" in task.words
-        assert "Nothing has to move" not in task.words
+        warned = "the controller of before moves the crane wherever it is connected" in task.words
+        assert warned == (step in ("joysticks", "dry"))
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,8 @@ from tests.commissioning.sensor.drives import Drive, machine
 
 AXIS = machine().axes["near_far"]
 RESTING = Script("rest", (), 30.0)
+AWAY = "no stretch of driving with measurements all the time"
+Change = Callable[[Series], Series]
 
 
 @functools.cache
@@ -111,47 +114,45 @@ def test_a_noise_that_hides_the_delay() -> None:
     refused(replace(one, value=one.value + noise), "of swing in a noise of 3", "drive it more")
 
 
-def test_a_value_that_stands() -> None:
-    refused(replace(good(), value=np.full_like(good().value, 0.1)), "it stands at 0.1")
+def cut(keep: Callable[[Array], Array | slice]) -> Change:
+    """Of the good drive the measurements at times that are kept."""
+
+    def change(one: Series) -> Series:
+        kept = keep(one.time_s)
+        return replace(one, time_s=one.time_s[kept], value=one.value[kept])
+
+    return change
 
 
-def test_a_sensor_at_its_end() -> None:
-    clipped = np.clip(good().value, -0.02, 0.02)
-    refused(replace(good(), value=clipped), "the sensor is at the end of its range")
+def value(change: Callable[[Array], Array]) -> Change:
+    return lambda one: replace(one, value=change(one.value))
 
 
-@pytest.mark.parametrize(("every", "many"), [(50, "got"), (2000, "got 1 in all")])
-def test_too_few_measurements(every: int, many: str) -> None:
-    one = good()
-    refused(replace(one, time_s=one.time_s[::every], value=one.value[::every]), "6 measure", many)
-
-
-def test_a_sensor_that_is_off_while_it_is_driven() -> None:
-    one = good()
-    on = (one.time_s < FIRST_S) | (one.time_s > 22.0)
-    refused(replace(one, time_s=one.time_s[on], value=one.value[on]), DRIVE_IT)
-
-
-def test_a_sensor_that_is_away_in_every_stroke() -> None:
-    one = good()
-    on = (one.time_s - FIRST_S) % 5.0 > 0.8
-    series = replace(one, time_s=one.time_s[on], value=one.value[on])
-    refused(series, "no stretch of driving with measurements all the time", DRIVE_IT)
-
-
-@pytest.mark.parametrize("factor", [57.3, 0.0175])
-def test_another_unit(factor: float) -> None:
-    fine = replace(good(), value=factor * good().value)
-    refused(fine, "the file has 1: is the unit in the DBC right?")
+@pytest.mark.parametrize(
+    ("change", "texts"),
+    [
+        (value(lambda swing: np.full_like(swing, 0.1)), ["it stands at 0.1"]),
+        (
+            value(lambda swing: np.clip(swing, -0.02, 0.02)),
+            ["the sensor is at the end of its range"],
+        ),
+        (value(lambda swing: 57.3 * swing), ["the file has 1: is the unit in the DBC right?"]),
+        (value(lambda swing: 0.0175 * swing), ["the file has 1: is the unit in the DBC right?"]),
+        (cut(lambda _time: slice(None, None, 50)), ["6 measure", "got"]),
+        (cut(lambda _time: slice(None, None, 2000)), ["6 measure", "got 1 in all"]),
+        (cut(lambda time: (time < FIRST_S) | (time > 22.0)), [DRIVE_IT]),
+        (cut(lambda time: (time - FIRST_S) % 5.0 > 0.8), [AWAY, DRIVE_IT]),
+        (lambda one: replace(one, command=None), ["expected commands of near_far in the log, got"]),
+    ],
+)
+def test_measurements_that_cannot_be_used(change: Change, texts: list[str]) -> None:
+    """They stand, are cut off at the sensor's end, in another unit, too few, or away."""
+    refused(change(good()), *texts)
 
 
 @pytest.mark.slow
 def test_a_delay_of_more_than_a_quarter_of_a_swing() -> None:
     refused(Drive(machine()).series(delay_s=0.6), "expected a delay up to 550 ms, a quarter")
-
-
-def test_no_commands() -> None:
-    refused(replace(good(), command=None), "expected commands of near_far in the log, got none")
 
 
 def test_one_stroke_is_too_little() -> None:

@@ -26,7 +26,7 @@ from canshaper.config.bus import REDUCED_PCT
 from canshaper.config.source import Source
 from canshaper.edit.edit import change, of_limits
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.stopping import rehearsed_valves, unstated
+from canshaper.machine.stop_distance import rehearsed_valves, unstated
 from canshaper.report import html, style
 from canshaper.report.console import axis_title, new_table
 from canshaper.report.style import embedded

@@ -101,6 +101,7 @@ def _signals(context: Context) -> dict[str, str]:
 
 def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Traffic) -> None:
     """Check that the axes were driven, and about as much in both drives."""
+    problems = outcome.problems
     table = new_table("axis", "driven before, s of full deflection", "after")
     for name in axes:
         both = [_driven_s(one.axes[name]) for one in (before, after)]
@@ -109,15 +110,13 @@ def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Tra
             moved = max(map(abs, one.axes[name].valve.value), default=0.0) > LEAST_MOVED
             if driven_s < LEAST_DRIVEN_S:
                 text = f"{name}: its joystick was moved for {driven_s:.1f} s of full deflection"
-                outcome.problems.append(f"{text} in the drive {when}: drive it as it says")
+                problems.append(f"{text} in the drive {when}: drive it as it says")
             elif not moved:
                 text = f"{name}: its valve received no motion in the drive {when}"
-                outcome.problems.append(
-                    f"{text}: hold the enable; see docs/states.md for the reason"
-                )
+                problems.append(f"{text}: hold the enable; see docs/states.md for the reason")
         if min(both) > LEAST_DRIVEN_S and max(both) > MOST_UNLIKE * min(both):
             text = f"driven for {both[0]:.1f} s of full deflection before, {both[1]:.1f} s after"
-            outcome.problems.append(f"{name}: {text}: drive the same both times")
+            problems.append(f"{name}: {text}: drive the same both times")
     outcome.sheet.print(table)
 
 
@@ -143,19 +142,18 @@ def _measured(context: Context, outcome: Outcome, raw: Recording, shaped: Record
 
 def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
     """Note the swing that is left; a problem where it is too much, or data is missing."""
+    problems = outcome.problems
     before, after = (measures[one]["residual_deg"] for one in ("raw", "shaped"))
     if before is None or after is None:
         rest_s = RESIDUAL_DWELL_S + RESIDUAL_WINDOW_MIN_S
         text = f"no rest of {rest_s:g} s after all joysticks were let go"
-        outcome.problems.append(
-            f"{text}, so no swing is left to compare: let go, and wait six seconds"
-        )
+        problems.append(f"{text}, so no swing is left to compare: let go, and wait six seconds")
         return
     if before < LEAST_SWING_DEG or measures["shaped"]["peak_deg"] < MIN_RAW_DEG:
         peak = measures["shaped"]["peak_deg"]
         text = f"a swing of {before} degrees was left without filters, at most {peak} with them"
         remedy = "nothing to compare: push harder; is it the right signal, and the sensor on?"
-        outcome.problems.append(f"{text}: {remedy}")
+        problems.append(f"{text}: {remedy}")
         return
     left_pct = 100.0 * after / before
     outcome.numbers["crane"] = {
@@ -166,11 +164,12 @@ def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
     if left_pct > 100.0 - LEAST_REDUCTION_PCT:
         text = f"{left_pct:.0f} % of the swing is left ({before} to {after} degrees)"
         remedy = "do swing, valve and filter again with what hangs on the crane now"
-        outcome.problems.append(f"{text}, expected less than a tenth: {remedy}")
+        problems.append(f"{text}, expected less than a tenth: {remedy}")
 
 
 def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
     """Ask what the person has seen of axes whose swing no signal measures."""
+    problems = outcome.problems
     names = ", ".join(axes)
     outcome.sheet.print(f"NOTHING MEASURED the swing of {names}: judge it by eye")
     question = (
@@ -186,12 +185,10 @@ def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
         outcome.numbers.update({name: {"judged": "by eye", "saw": saw} for name in axes})
     elif saw == SAME:
         text = f"{names}: by eye the filters take no swing away"
-        outcome.problems.append(f"{text}: do swing, valve and filter again")
+        problems.append(f"{text}: do swing, valve and filter again")
     else:
         text = f"{names}: nothing measured the swing, and no one has judged it by eye"
-        outcome.problems.append(
-            f"{text}: watch the grapple in both drives, then answer {LESS} or {SAME}"
-        )
+        problems.append(f"{text}: watch the grapple in both drives, then answer {LESS} or {SAME}")
 
 
 DRIVE = Step(

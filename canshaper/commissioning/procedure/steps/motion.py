@@ -70,9 +70,8 @@ def drive_dry(context: Context) -> Outcome:
         outcome.sheet.print(f"valve frames: {sent}")
         if sent:
             outcome.problems.append(f"expected no valve frame, got {sent}; do not go on")
-    outcome.figures[""] = lambda: figure(
-        traffic, "Dry drive: the joysticks as the daemon sees them"
-    )
+    title = "Dry drive: the joysticks as the daemon sees them"
+    outcome.figures[""] = lambda: figure(traffic, title)
     return outcome
 
 

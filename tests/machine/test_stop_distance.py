@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.config.schema import AxisSection
-from canshaper.machine.stopping import (
+from canshaper.machine.stop_distance import (
     FullSpeed,
     allowed_m,
     full_speed,
@@ -58,7 +58,7 @@ def test_a_distance_that_the_limits_just_reach_is_good(
     allowed = allowed_m(axis, timeout_ms=100, period_s=0.02)
     assert allowed is not None
     assert stated_fault(stopping(axis, allowed), timeout_ms=100, period_s=0.02) is None
-    monkeypatch.setattr("canshaper.machine.stopping.MOST_UNSTATED_M", allowed)
+    monkeypatch.setattr("canshaper.machine.stop_distance.MOST_UNSTATED_M", allowed)
     assert unstated_fault(stopping(axis, None), timeout_ms=100, period_s=0.02) is None
 
 
