@@ -88,6 +88,7 @@ def test_a_valve_whose_node_restarts_between_two_ticks_begins_with_init(rig: Can
     rig.moving()
     rig.heartbeat("slew", BOOT_UP)
     assert rig.run(Slew=30000)["slew"] == {"ControlWord": INIT, "SetPoint": 0}
+    assert rig.axis() == ("TRIPPED", "VALVE_FAULT")
 
 
 @pytest.mark.parametrize(
