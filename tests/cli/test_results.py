@@ -76,7 +76,9 @@ def test_a_verb_ends_with_results_picture_what_follows_and_its_exit_code(
     picture = tmp_path / "p.png"
     results = Results("A title", None, tmp_path / "r.html", picture, soft_wrap=True)
     with pytest.raises(Exit) as ended:
-        results.conclude(lambda to: to.print("found"), figure=drawn, after=["Written"], code=1)
+        results.conclude(
+            lambda to: to.print("found"), figure=drawn, finish=lambda: ["Written"], code=1
+        )
     report = f"Report: {tmp_path / 'r.html'}"
     said = capsys.readouterr().out.splitlines()
     assert (said, ended.value.exit_code) == (["found", f"Picture: {picture}", "Written", report], 1)
