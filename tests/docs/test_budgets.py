@@ -68,7 +68,7 @@ LINES = {
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
     "canshaper": (66_362, "a new ability takes the room of an old one"),
-    "tests": (100_585, "one level for each behaviour"),
+    "tests": (100_599, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (345, "one that only hands on is joined to its reader")}
