@@ -66,8 +66,8 @@ LINES = {
         4_925,
         "the method: filters, axis, motion, ends, observer of the sway",
     ),
-    "canshaper": (66_487, "a new ability takes the room of an old one"),
-    "tests": (99_520, "one level for each behaviour"),
+    "canshaper": (66_362, "a new ability takes the room of an old one"),
+    "tests": (100_599, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (329, "one that only hands on is joined to its reader")}
