@@ -9,12 +9,13 @@ from canshaper.shaping.states import State
 def report(
     state: State,
     reason: int,
-    command: float = 0.0,
-    sent: float = 0.0,
+    demand: float = 0.0,
+    setpoint: float = 0.0,
     sway_deg: float = 0.0,
     *,
     active_set: int = 0,
 ) -> Any:
     """An axis with these values."""
-    axis = SimpleNamespace(state=state, command=command, sent=sent)
+    output = SimpleNamespace(setpoint=setpoint)
+    axis = SimpleNamespace(state=state, demand=demand, output=output)
     return SimpleNamespace(axis=axis, reason=reason, sway_deg=sway_deg, active_set=active_set)
