@@ -66,10 +66,12 @@ def state_rows() -> Iterator[str]:
 
 
 def status_rows() -> Iterator[str]:
-    """List of the signals of a status message."""
-    for required in (True, False):
-        names = ", ".join(f"`{one.name}`" for one in AXIS_STATUS if one.required is required)
-        yield f"- {'always' if required else 'where the DBC has them'}: {names}"
+    """Table of the signals of a status message."""
+    yield "| signal | value | sent |"
+    yield "|---|---|---|"
+    for one in AXIS_STATUS:
+        sent = "always" if one.required else "where the DBC has it"
+        yield f"| `{one.name}` | {one.meaning} | {sent} |"
 
 
 def diagram() -> Iterator[str]:

@@ -114,30 +114,34 @@ class Results(SafeConsole):
         figure: Callable[[], "Figure"] | None = None,
         path: Path | None = None,
         data: Callable[[Path | None], Mapping[str, Any]] | None = None,
-        after: Sequence[str] = (),
+        finish: Callable[[], Sequence[str]] = list,
         code: int = 0,
     ) -> None:
-        """End a verb that measured or designed; it has written into the deployment file before.
+        """End a verb: draw, write, then show, as the reader of the output may end at any line.
 
         Args:
             show: prints the results.
             figure: draws their picture; None where there is nothing to draw.
             path: as of ``picture``.
             data: of ``--json``, by the file of the picture; None without that option.
-            after: lines on what was written, and what to do next.
+            finish: writes into the deployment file; returns lines on that, and what to do next.
             code: exit code.
 
         Raises:
             typer.Exit: the exit code is not 0.
         """
-        show(self)
+        before = len(self._parts)
         drawn = self.picture(path, figure) if figure else None
+        drawing, self._parts[before:] = self._parts[before:], []
+        lines = finish()
+        show(self)
+        self._parts += drawing
         if data:
             echo(json.dumps(data(drawn), indent=2, default=str))
         if figure and (path or self._picture):
             self.picture_line(drawn)
-        if after:
-            self.print("\n".join(after), soft_wrap=True)
+        if lines:
+            self.print("\n".join(lines), soft_wrap=True)
         self.write(code)
 
     def write(self, code: int = 0) -> None:

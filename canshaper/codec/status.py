@@ -34,6 +34,7 @@ class StatusField(Generic[Source]):
         decode: converts that value to the one that is shown.
         required: whether a message without this signal is refused.
         largest: largest code of a field whose raw value is a code; None for a measurement.
+        meaning: meaning and unit, for docs/states.md.
     """
 
     name: str
@@ -41,6 +42,7 @@ class StatusField(Generic[Source]):
     decode: Callable[[Any], Any] = float
     required: bool = False
     largest: int | None = None
+    meaning: str = ""
 
     def shown(self, value: object) -> str:
         """Return a decoded value as text: the name of a code, "unknown" for codes without one."""
@@ -49,15 +51,15 @@ class StatusField(Generic[Source]):
         return f"unknown ({value})" if isinstance(self.decode, _Code) else f"{value:g}"
 
 
+@dataclass(frozen=True, slots=True)
 class _Code:
     """Decodes a code to a member of an enum; a code that this program does not know stays int."""
 
-    def __init__(self, kind: type[IntEnum]) -> None:
-        self._kind = kind
+    kind: type[IntEnum]
 
     def __call__(self, value: int) -> int:
         try:
-            return self._kind(value)
+            return self.kind(value)
         except ValueError:
             return int(value)
 
@@ -72,14 +74,26 @@ def _applied_pct(one: Any) -> float:
 
 # Nothing here may be a lambda: a deployment is pickled by the process that has read it.
 AXIS_STATUS: list[StatusField[Any]] = [
-    StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State)),
-    StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason)),
-    StatusField("RawCommand", _command_pct, required=True),
-    StatusField("ShapedCommand", _applied_pct, required=True),
-    StatusField("PredictedSway", attrgetter("sway_deg"), required=True),
-    StatusField("ActiveSet", attrgetter("active_set"), int),
-    StatusField("SwaySensor", attrgetter("trust"), _Code(Trust), largest=max(Trust)),
-    StatusField("SwingLength", attrgetter("swing_length_m")),
+    StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State), "state"),
+    StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason), "its reason"),
+    StatusField("RawCommand", _command_pct, required=True, meaning="joystick, % of full speed"),
+    StatusField("ShapedCommand", _applied_pct, required=True, meaning="valve, % of full speed"),
+    StatusField(
+        "PredictedSway", attrgetter("sway_deg"), required=True, meaning="predicted swing, degrees"
+    ),
+    StatusField("ActiveSet", attrgetter("active_set"), int, meaning="selected parameter set"),
+    StatusField(
+        "SwaySensor",
+        attrgetter("trust"),
+        _Code(Trust),
+        largest=max(Trust),
+        meaning="[trust](sensor.md#when-it-is-trusted) in the sway sensor",
+    ),
+    StatusField(
+        "SwingLength",
+        attrgetter("swing_length_m"),
+        meaning="pendulum length by the sway sensor, m; 0 before it is known",
+    ),
 ]
 LAST_FAULT: StatusField[dict[str, int]] = StatusField(
     "LastFault", itemgetter("LastFault"), _Code(FrameFault), True, max(FrameFault)

@@ -110,14 +110,8 @@ def figure(one: RobustDesign) -> "Figure":
         robust_plot.Candidate("this one", task.in_file(one.shaper)),
         robust_plot.Candidate(f"in the file, {present.kind}", other),
     ]
-    return robust_plot.figure(
-        one.bound.name,
-        task.mode,
-        task.tick_s,
-        machine=task.machine(),
-        filters=filters,
-        range_pct=task.range_pct,
-    )
+    setup, width = (one.bound.name, task.mode, task.tick_s), task.range_pct
+    return robust_plot.figure(*setup, machine=task.machine(), filters=filters, range_pct=width)
 
 
 def _table(one: RobustDesign) -> Table:

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import sys
 from base64 import b64decode
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 from rich.table import Table
 from rich.text import Text
+from typer import Exit
 from typer.testing import CliRunner
 
 from canshaper import __version__
@@ -66,6 +68,25 @@ def test_nothing_is_written_where_nothing_is_asked_for(tmp_path: Path) -> None:
     assert results.picture(None, drawn) is None
     results.write()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_verb_ends_with_results_picture_what_follows_and_its_exit_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture = tmp_path / "p.png"
+    results = Results("A title", None, tmp_path / "r.html", picture, soft_wrap=True)
+    with pytest.raises(Exit) as ended:
+        results.conclude(
+            lambda to: to.print("found"), figure=drawn, finish=lambda: ["Written"], code=1
+        )
+    report = f"Report: {tmp_path / 'r.html'}"
+    said = capsys.readouterr().out.splitlines()
+    assert (said, ended.value.exit_code) == (["found", f"Picture: {picture}", "Written", report], 1)
+    monkeypatch.setitem(sys.modules, "canshaper.report.style", None)  # without matplotlib
+    Results("A title", None, None, picture, quiet=True).conclude(
+        lambda to: to.print("found"), figure=drawn, data=lambda path: {"picture": path}
+    )
+    assert json.loads(capsys.readouterr().out) == {"picture": None}
 
 
 @pytest.mark.parametrize(

@@ -77,3 +77,16 @@ def test_a_trip_of_another_axis_is_none_of_theirs(changed_rig: Make) -> None:
     rig.run(1, Slew=1000, Lift=1000)
     assert rig.reason("lift") == "SEND_FAILED"
     assert abs(rig.controller.axes["near_far"].added) > 0.9 * abs(before) > 0.0
+
+
+def test_a_trip_of_slew_is_the_end_of_what_it_added_to_near_far(changed_rig: Make) -> None:
+    rig = moving_as_one(changed_rig)
+    rig.run(3)
+    near_far(rig, 40, Slew=1000, NearFar=300)
+    control = rig.controller.axes["near_far"]
+    assert control.added
+    rig.controller.send_failed(Frame("crane", 512, False, bytes(2)))
+    for _ in range(5):
+        rig.run(1, Slew=1000, NearFar=300)
+        assert control.added == 0.0
+    assert rig.reason() == "SEND_FAILED"

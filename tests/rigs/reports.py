@@ -9,13 +9,13 @@ from canshaper.shaping.states import State
 def report(
     state: State,
     reason: int,
-    demand: float = 0.0,
-    setpoint: float = 0.0,
+    command: float = 0.0,
+    sent: float = 0.0,
     sway_deg: float = 0.0,
     *,
     active_set: int = 0,
 ) -> Any:
     """An axis with these values."""
-    output = SimpleNamespace(setpoint=setpoint)
-    axis = SimpleNamespace(state=state, demand=demand, output=output)
+    output = SimpleNamespace(setpoint=sent)
+    axis = SimpleNamespace(state=state, demand=command, output=output)
     return SimpleNamespace(axis=axis, reason=reason, sway_deg=sway_deg, active_set=active_set)

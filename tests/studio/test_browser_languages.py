@@ -13,6 +13,7 @@ from tests.studio.conftest import Studio
 from tests.studio.languages import ENGLISH, OTHERS, texts
 from tests.studio.reader import english_said, in_language, is_good
 
+TERMS = ("ready", "joystick in neutral")
 STAND_STILL = "ms => { const t = performance.now(); while (performance.now() - t < ms); }"
 
 
@@ -22,6 +23,7 @@ def test_the_page_speaks_the_language_of_the_browser(
 ) -> None:
     """At rest, driven, after it stood still, and when the studio is gone."""
     studio, table = own(), texts(language)
+    ready_words, neutral = (table.get(f"term.{one}", one) for one in TERMS)
     page = in_language(tab, studio, language)
     assert page.get_attribute("html", "lang") == language
     assert page.input_value("#language") == language
@@ -32,11 +34,11 @@ def test_the_page_speaks_the_language_of_the_browser(
     expect(page.locator("#seat")).to_have_text(table["seat.drive"])
     ready = page.locator("#axes tr:nth-child(2) td:nth-child(2)")
     expect(ready.locator(".state")).to_have_text("ready")  # the daemon's term
-    meaning = f"{table['term.ready']}: {table['term.joystick in neutral']}"
+    meaning = f"{ready_words}: {neutral}"
     expect(ready.locator(".means")).to_have_text("" if language == ENGLISH else meaning)
     expect(page.locator("#language")).to_be_disabled()
     # What the studio says, and a state with its reason; the key of an axis is no word.
-    words = f"{table['axis.slew']}: {table['term.ready']} — {table['term.joystick in neutral']}"
+    words = f"{table['axis.slew']}: {ready_words} — {neutral}"
     expect(page.locator("#events li", has_text=words).first).to_be_visible()
     expect(page.locator("#events li", has_text=table["said.daemon"]).first).to_be_visible()
     page.evaluate(STAND_STILL, 900)

@@ -15,7 +15,7 @@ from tests.studio.languages import ENGLISH, OTHERS, PLACE, texts
 KEY = re.compile(r"""data-t(?:-\w+)?="([\w.]+)"|["`]([a-z]\w*(?:\.\w+)+)["`]""")
 NOT_TEXTS = re.compile(r"\.(js|csv|png|json)$")
 # Keys that scripts put together, by what they begin with.
-COMPOSED = ("term.", "axis.", "way.", "crane.", "slider.", "stick.", "gamepad.", "chart.a")
+COMPOSED = ("axis.", "way.", "crane.", "slider.", "stick.", "gamepad.", "chart.a")
 COMPOSED += ("status.", "step.", "said.", "level.", "study.", "chart.hall.")
 NAMES = {"canshaper", "canshaper studio", "Commissioning, canshaper studio", "studio"}
 NAMES |= {"CSV", "PNG", "A/B"}
@@ -30,17 +30,19 @@ def test_there_are_the_languages_that_the_page_offers() -> None:
 
 @pytest.mark.parametrize("language", OTHERS)
 def test_every_language_has_every_text_with_its_placeholders(language: str) -> None:
-    english, own = texts(ENGLISH), texts(language)
+    english = texts(ENGLISH)
+    own = {key: text for key, text in texts(language).items() if not key.startswith("term.")}
     assert list(own) == list(english)
     for key, text in own.items():
         assert text.strip() and sorted(PLACE.findall(text)) == sorted(PLACE.findall(english[key]))
 
 
-def test_states_and_reasons_are_those_of_the_daemon() -> None:
-    """Each of them has a meaning in every language; in English it is its own."""
-    terms = {key[5:]: text for key, text in texts(ENGLISH).items() if key.startswith("term.")}
-    daemon = [one.words for one in (*STATE_TEXTS.values(), *REASON_TEXTS.values())]
-    assert terms == {words: words for words in daemon}
+@pytest.mark.parametrize("language", OTHERS)
+def test_states_and_reasons_are_those_of_the_daemon(language: str) -> None:
+    """One that has no words in a language yet is shown in English."""
+    terms = {key[5:] for key, text in texts(language).items() if key.startswith("term.") and text}
+    daemon = {one.words for one in (*STATE_TEXTS.values(), *REASON_TEXTS.values())}
+    assert terms and terms <= daemon
 
 
 def keys_of(path: Path) -> set[str]:

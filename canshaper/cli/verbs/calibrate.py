@@ -136,17 +136,20 @@ def calibrate(
         return
     result, top_pct = drive.result(), 100.0 * ramp.top
     lines = curve_lines(deployment, axes[0], result, top_pct)
-    if write:
-        write_curve(deployment, axes[0], result, origin)
 
     def figure() -> "Figure":
         from canshaper.commissioning.plots import of_valve
 
         return of_valve(axes[0], limits[0].output_limits(), result, top_pct)
 
-    after = [written_line(deployment.path)] if write else []
+    def finish() -> list[str]:
+        write_curve(deployment, axes[0], result, origin)
+        return [written_line(deployment.path)]
+
     results.conclude(
-        lambda to: to.print("\n".join(lines), soft_wrap=True), figure=figure, after=after
+        lambda to: to.print("\n".join(lines), soft_wrap=True),
+        figure=figure,
+        finish=finish if write else list,
     )
 
 

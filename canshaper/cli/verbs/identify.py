@@ -134,9 +134,8 @@ def identify(
     results = Results(TITLES[together], deployment, report, picture, quiet=as_json, soft_wrap=True)
     options: dict[str, Any] = {"axis": axis, "channel": channel, "about_s": about_s}
     if logs and Path(logs[0]).is_dir():
-        of_one = {"--write": write, "--json": as_json, "--picture": picture}
         folders = [*map(Path, logs)]
-        check_only_folders(folders, of_one)
+        check_only_folders(folders, {"--write": write, "--json": as_json, "--picture": picture})
         work = partial(identified, file, signal or [], dbc or [], options)
         run_fleet(engine(processes, scheduler), work, folders, show_periods, out, results)
         return
@@ -146,8 +145,8 @@ def identify(
         speeds = signals_named(signal or [], deployment)
         axes = pair_of(deployment, [*speeds])
         drives = drives_in(deployment, paths_of(logs or []), axes, speeds, channel)
-        origin = measured_in(logs or [], deployment.messages) if write else None
-        pump = pump_lines(deployment, axes, drives, origin)
+        origin = measured_in(logs or [], deployment.messages)
+        pump = pump_lines(deployment, axes, drives, origin if write else None)
         results.conclude(lambda to: to.print("\n".join(pump)))
         return
     with os_errors(out):
@@ -160,16 +159,20 @@ def identify(
                 messages = messages_of(dbc or [], deployment)
                 findings = logged(logs or [], *named, messages, **options, on_progress=on_progress)
         advice = advice_on(findings, deployment)
-        written = []
-        if write and deployment:
-            origin = measured_in(logs or [], messages_of(dbc or [], deployment))
-            written = write_sway(deployment, findings, advice, origin)
     seen = [one for one in findings if one.free or one.driven]
 
     def figure() -> "Figure":
         from canshaper.commissioning.identification.plot import figure as of_swings
 
         return of_swings(seen, headlines(findings, advice))
+
+    written: list[str] = []
+
+    def finish() -> list[str]:
+        if write and deployment:
+            origin = measured_in(logs or [], messages_of(dbc or [], deployment))
+            written.extend(write_sway(deployment, findings, advice, origin))
+        return _next_steps(advice, deployment, written) if deployment else []
 
     def data(path: Path | None) -> dict[str, Any]:
         return as_dict(findings, advice) | {"picture": path, "written": written}
@@ -179,7 +182,7 @@ def identify(
         figure=figure if seen else None,
         path=out / "identify.png",
         data=data if as_json else None,
-        after=_next_steps(advice, deployment, written) if deployment else (),
+        finish=finish,
         code=0 if all(one.usable for one in findings) else EXIT_NOT_ENOUGH_DATA,
     )
 

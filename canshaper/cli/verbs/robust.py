@@ -136,7 +136,11 @@ def robust(
         show = partial(print_design, deployment, designs[0])
     useless = any(one.verdict.useless for one in designs) and not force
     write = write and not useless
-    changed = write_design(deployment, *designs) if write else []
+
+    def finish() -> list[str]:
+        if not write:
+            return lines_for_file(designs)
+        return [*write_design(deployment, *designs), written_line(deployment.path)]
 
     def data(path: Path | None) -> dict[str, Any]:
         data = {"loads": [*map(_result, designs)]} if loads else _result(designs[0])
@@ -146,7 +150,7 @@ def robust(
         show,
         figure=lambda: figure(designs[0]),
         data=data if as_json else None,
-        after=[*changed, written_line(deployment.path)] if write else lines_for_file(designs),
+        finish=finish,
         code=EXIT_USELESS if useless else 0,
     )
 
@@ -171,11 +175,12 @@ def for_fleet(
     results = Results("Filters for a fleet", deployment, report, picture)
     with progress_bar("candidates") as on_progress:
         asked, rows = design_fleet(deployment, kind, duration_s, Processes(), on_progress)
-    if write:
-        verb = "tune" if kind == "gff" else kind
-        lines = [*write_fleet(deployment, asked.filters, verb), written_line(deployment.path)]
-    else:
-        lines = [
+
+    def finish() -> list[str]:
+        if write:
+            verb = "tune" if kind == "gff" else kind
+            return [*write_fleet(deployment, asked.filters, verb), written_line(deployment.path)]
+        return [
             f"axes.{one.axis}:\n  sway: {flow(one.sway)}\n  filter: {flow(one.section)}"
             + (f"\n  limits: {flow({'tail_s': one.tail_s})}" if one.tail_s else "")
             for one in asked.filters
@@ -185,7 +190,7 @@ def for_fleet(
         to.print(table(asked, rows))
         to.print(verdict(asked, rows), soft_wrap=True)
 
-    results.conclude(show, figure=lambda: figure(rows), after=lines)
+    results.conclude(show, figure=lambda: figure(rows), finish=finish)
 
 
 def _lengths(text: str | None) -> tuple[float, float] | None:

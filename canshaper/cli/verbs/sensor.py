@@ -102,18 +102,21 @@ def sensor(
                 _simulate(deployment, axes, log, changes or [])
         series = read_sensors(log, deployment, axes)
         findings = [examine(deployment.axes[name], series[name]) for name in axes]
-        written = write_sensors(deployment, findings, given, live=live) if write else []
 
     def figure() -> "Figure":
         from canshaper.commissioning.plots import of_sensors
 
         return of_sensors(findings)
 
+    def finish() -> list[str]:
+        written = write_sensors(deployment, findings, given, live=live)
+        return [*written, written_line(deployment.path)] if written else []
+
     results.conclude(
         partial(_print, deployment, findings),
         figure=figure if any(one.fit for one in findings) else None,
         path=out / "sensor.png",
-        after=[*written, written_line(deployment.path)] if written else (),
+        finish=finish if write else list,
         code=0 if all(one.usable for one in findings) else EXIT_NOT_ENOUGH_DATA,
     )
 

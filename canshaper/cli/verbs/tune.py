@@ -142,8 +142,13 @@ def tune(
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
     useless = one.verdict.useless and not force
-    changed = write_tuned(deployment, one) if write and not useless else []
-    written = deployment.path if write and not useless else None
+    written, changed = deployment.path if write and not useless else None, list[str]()
+
+    def finish() -> list[str]:
+        if not written:
+            return []
+        changed.extend(write_tuned(deployment, one))
+        return [*changed, written_line(written)]
 
     def data(path: Path | None) -> dict[str, Any]:
         return as_dict(one) | {"picture": path, "written": written, "changed": changed}
@@ -153,7 +158,7 @@ def tune(
         figure=lambda: figure(one),
         path=out / f"{axis}.png",
         data=data if as_json else None,
-        after=[*changed, written_line(written)] if written else (),
+        finish=finish,
         code=EXIT_USELESS if useless else 0,
     )
 

@@ -54,10 +54,7 @@ class Calibration:
     negative: Direction
 
     def curve(self) -> tuple[list[float], list[float]]:
-        """Return commands and speeds in % for the deployment file.
-
-        Full speed is that of the faster direction.
-        """
+        """Return commands and speeds, % of the full speed of the faster direction, for the file."""
         full = max(self.positive.full, self.negative.full)
         commands, speeds = list[float](), list[float]()
         for sign, one in ((-1.0, self.negative), (1.0, self.positive)):

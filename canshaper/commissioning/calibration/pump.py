@@ -166,11 +166,7 @@ def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
 
 
 def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
-    """Return the two axes that are named, or the first two with a filter.
-
-    Raises:
-        UsageError: they are not two, or not of this machine.
-    """
+    """Return the two axes that are named, or the first two with a filter; UsageError for others."""
     filtered = [n for n, one in deployment.config.axes.items() if one.filter.kind != "off"]
     names = tuple(dict.fromkeys(axes)) or tuple(filtered[:2])
     if len(names) != 2 or not {*names} <= deployment.axes.keys():

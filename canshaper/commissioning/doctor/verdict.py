@@ -72,14 +72,7 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of a check.
-
-    Attributes:
-        subject: what was checked.
-        level: how severe it is.
-        found: what was found.
-        remedy: what to do; empty where there is nothing to do.
-    """
+    """Result of the check of a subject: what was found, and what to do, if anything."""
 
     subject: str
     level: Level

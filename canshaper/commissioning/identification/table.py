@@ -152,11 +152,7 @@ def _numbers(row: list[str], delimiter: str) -> list[float] | None:
 
 
 def _left_out(path: Path, width: int, lines: Array, wrong: list[int]) -> list[str]:
-    """Return notes on lines that are no numbers.
-
-    Raises:
-        IdentificationError: they are too many, or no lines are left.
-    """
+    """Return notes on lines that are no numbers, of which there may be few."""
     count, bad = len(lines), len(wrong)
     if bad * _WRONG_LINES > count + _WRONG_LINES:
         text = f"expected {width} numbers a line, got {bad} lines of {count + bad} without"
