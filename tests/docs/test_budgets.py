@@ -42,7 +42,7 @@ BUDGET = {
     "docs/identification.md": 550,
     "docs/j1939.md": 660,
     "docs/machine-manual.md": 890,
-    "docs/machines.md": 920,
+    "docs/machines.md": 840,
     "docs/monitor.md": 350,
     "docs/realtime.md": 400,
     "docs/replay.md": 790,
