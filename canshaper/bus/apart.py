@@ -18,7 +18,6 @@ from select import select
 
 import can
 
-from canshaper.bus.python_can import receive
 from canshaper.gate.cycle import boottime_ns
 
 # Longest time from ``send`` until a frame leaves, and longest time that an adapter may take for one
@@ -44,6 +43,7 @@ class BusApart:
 
     Args:
         bus: the bus that may block; nothing else may call it from now on.
+        receive: returns its next waiting frame, or None; raises what the interface raises.
 
     Attributes:
         since_ns: time by ``boottime_ns`` when the bus was last seen empty before the frame that
@@ -52,11 +52,13 @@ class BusApart:
         lost: number of frames dropped because too many waited to be read.
     """
 
-    def __init__(self, bus: can.BusABC) -> None:
+    def __init__(
+        self, bus: can.BusABC, receive: Callable[[can.BusABC], can.Message | None]
+    ) -> None:
         self.since_ns = boottime_ns()
         self.took = True
         self.lost = 0
-        self._bus = bus
+        self._bus, self._receive = bus, receive
         self._descriptor = descriptor(bus)
         self._changed = threading.Condition()
         self._waiting: dict[tuple[int, bool], tuple[can.Message, int]] = {}
@@ -184,7 +186,7 @@ class BusApart:
             polled_ns, readable = boottime_ns(), self._readable(0.0)
             result: can.Message | Exception | None
             try:
-                result = receive(self._bus)
+                result = self._receive(self._bus)
             except Exception as error:  # each interface raises its own classes
                 result = error
             if result is None and readable and ended(self._descriptor):
@@ -198,7 +200,7 @@ class BusApart:
             if isinstance(result, Exception):
                 time.sleep(POLL_S)  # every call may fail
             elif result is None and not readable:
-                # If the line was readable, ``receive`` took bytes that are no frame, and a frame
+                # If the line was readable, ``_receive`` took bytes that are no frame, and a frame
                 # may wait behind them.
                 empty_ns = polled_ns
                 self._readable(LOOK_S)

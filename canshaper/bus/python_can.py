@@ -4,7 +4,6 @@ import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from importlib import import_module
 from typing import Any
 
 import can
@@ -106,8 +105,9 @@ class PythonCanPort:
         self._bus: Any = open_python_can(config)
         self._apart = config.interface not in NEVER_BLOCK
         if self._apart:
-            # Imported only here: it uses modules that only POSIX has.
-            self._bus = import_module("canshaper.bus.apart").BusApart(self._bus)
+            from canshaper.bus.apart import BusApart  # uses modules that only POSIX has
+
+            self._bus = BusApart(self._bus, receive)
         # Multicast returns the frames of this process; the other interfaces do not.
         multicast = config.interface == "udp_multicast"
         self._echoes: deque[Frame] | None = deque(maxlen=MOST_ECHOES) if multicast else None

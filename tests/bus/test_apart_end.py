@@ -8,6 +8,7 @@ import pytest
 
 from canshaper.bus import apart
 from canshaper.bus.apart import BusApart
+from canshaper.bus.python_can import receive
 from tests.bus.held import Held, message
 from tests.bus.lines import ANSWER_S, THEIR_BYTES, SerialLine, until
 
@@ -43,14 +44,14 @@ def line() -> Iterator[SerialLine]:
 
 def test_its_threads_do_not_hold_the_process(held: Held) -> None:
     before = threading.enumerate()
-    bus = BusApart(held)  # type: ignore[arg-type]
+    bus = BusApart(held, receive)  # type: ignore[arg-type]
     daemons = [thread.daemon for thread in threading.enumerate() if thread not in before]
     bus.shutdown()
     assert daemons == [True, True]
 
 
 def test_its_descriptors_are_closed(held: Held) -> None:
-    bus = BusApart(held)  # type: ignore[arg-type]
+    bus = BusApart(held, receive)  # type: ignore[arg-type]
     ends = bus._wake_reader, bus._wake_writer
     assert bus.fileno() == ends[0].fileno() >= 0
     bus.shutdown()
@@ -61,7 +62,7 @@ def test_an_interface_is_closed_once_its_read_has_returned(monkeypatch: pytest.M
     """And is given a while to return: one that never does is closed all the same."""
     monkeypatch.setattr(apart, "CLOSE_S", ANSWER_S)
     reading = Reading()
-    bus = BusApart(reading)  # type: ignore[arg-type]
+    bus = BusApart(reading, receive)  # type: ignore[arg-type]
     join, waited_s = bus._receiver.join, []
 
     def joined(timeout: float | None = None) -> None:
@@ -86,7 +87,7 @@ def test_what_a_line_did_not_send_is_dropped_where_the_interface_hangs(
     """It would hold the process until it is sent; else it is what was sent last, and leaves."""
     monkeypatch.setattr(apart, "CLOSE_S", 0.0 if hangs else ANSWER_S)
     held.line, written = line._theirs, THEIR_BYTES + 2000
-    bus = BusApart(held)  # type: ignore[arg-type]
+    bus = BusApart(held, receive)  # type: ignore[arg-type]
     bus.send(message(1))
     until(lambda: held.begun)
     os.write(line._theirs, bytes(written))

@@ -13,6 +13,7 @@ import pytest
 
 from canshaper.bus import apart
 from canshaper.bus.apart import LOOK_S, POLL_S, BusApart, ended
+from canshaper.bus.python_can import receive
 from tests.bus.held import Held, message
 from tests.bus.lines import until
 
@@ -59,7 +60,7 @@ class Polled(Held):
 
     def first(self, count: int) -> list[Any]:
         """Open it; what is done first."""
-        self.bus = BusApart(self)  # type: ignore[arg-type]
+        self.bus = BusApart(self, receive)  # type: ignore[arg-type]
         until(lambda: len(self.calls) >= count)
         return self.calls[:count]
 

@@ -11,6 +11,7 @@ import pytest
 
 from canshaper.bus import apart
 from canshaper.bus.apart import LEAVE_NS, MOST_RECEIVED, PROBE_NS, BusApart, unsent
+from canshaper.bus.python_can import receive
 from tests.bus.held import Held, message
 from tests.bus.lines import until
 
@@ -29,7 +30,7 @@ def held() -> Held:
 
 @pytest.fixture
 def bus(held: Held, now: list[int]) -> Iterator[BusApart]:
-    made = BusApart(held)  # type: ignore[arg-type]
+    made = BusApart(held, receive)  # type: ignore[arg-type]
     yield made
     held.go.release(1000)
     made.shutdown()
@@ -212,7 +213,7 @@ def test_a_frame_and_what_is_raised_come_in_their_order(bus: BusApart, held: Hel
 @pytest.mark.slow
 def test_a_backlog_is_bounded(held: Held) -> None:
     held.waiting = [message(n % 256) for n in range(MOST_RECEIVED + 10)]
-    bus = BusApart(held)  # type: ignore[arg-type]
+    bus = BusApart(held, receive)  # type: ignore[arg-type]
     until(lambda: not held.waiting)
     count = 0
     while bus.recv(0):
@@ -224,7 +225,7 @@ def test_a_backlog_is_bounded(held: Held) -> None:
 
 
 def test_an_interface_that_never_returns_is_left_behind(held: Held) -> None:
-    bus = BusApart(held)  # type: ignore[arg-type]
+    bus = BusApart(held, receive)  # type: ignore[arg-type]
     bus.send(message(1))
     until(lambda: held.begun)
     bus.shutdown()
@@ -236,7 +237,7 @@ def test_an_interface_that_never_returns_is_left_behind(held: Held) -> None:
 def test_a_line_that_is_closed_meanwhile_is_no_end(held: Held) -> None:
     ours, theirs = socket.socketpair()
     held.line = ours.fileno()
-    bus = BusApart(held)  # type: ignore[arg-type]
+    bus = BusApart(held, receive)  # type: ignore[arg-type]
     ours.close()
     theirs.close()
     held.waiting = [message(1)]
