@@ -102,6 +102,11 @@ def test_a_range_that_seven_bits_reach(high: float, offset: float, good: bool) -
     assert magnitude_range(one) == (None if good else text)
 
 
+def test_a_finer_scale_reaches_less() -> None:
+    text = "S cannot reach its range [0|100] with 9 bits at 0.1 per bit"
+    assert magnitude_range(signal(0.0, 100.0, 0.1, bits=9)) == text
+
+
 @pytest.mark.parametrize(("low", "good"), [(0.0, True), (0.5, True), (-0.5, False)])
 def test_the_range_of_a_radius(low: float, good: bool) -> None:
     text = f"S: expected a range from 0 m or more, got [{low:g}|20]"
