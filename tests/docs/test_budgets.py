@@ -24,7 +24,7 @@ BUDGET = {
     "README.md": 620,
     "SECURITY.md": 350,
     "docs/api.md": 140,
-    "docs/architecture.md": 330,
+    "docs/architecture.md": 370,
     "docs/calibration.md": 400,
     "docs/campaign.md": 900,
     "docs/canopen.md": 660,
@@ -41,7 +41,7 @@ BUDGET = {
     "docs/identification.md": 550,
     "docs/j1939.md": 580,
     "docs/machine-manual.md": 830,
-    "docs/machines.md": 920,
+    "docs/machines.md": 840,
     "docs/monitor.md": 350,
     "docs/realtime.md": 380,
     "docs/replay.md": 790,
@@ -62,12 +62,9 @@ BUDGET = {
 # Lines of Python, and why so many.
 LINES = {
     "canshaper/gate": (2_118, "read in a day by someone who has never seen it"),
-    "canshaper/shaping": (
-        4_925,
-        "the method: filters, axis, motion, ends, observer of the sway",
-    ),
+    "canshaper/shaping": (4_925, "the method: filters, axis, motion, ends, observer of the sway"),
     "canshaper": (66_487, "a new ability takes the room of an old one"),
-    "tests": (99_520, "one level for each behaviour"),
+    "tests": (99_517, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (329, "one that only hands on is joined to its reader")}
