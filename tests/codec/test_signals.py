@@ -87,18 +87,21 @@ def test_a_range_the_wrong_way_round() -> None:
 
 
 @pytest.mark.parametrize(
-    ("high", "offset", "good"),
+    ("high", "offset", "scale", "good"),
     [
-        (127.0, 0.0, True),
-        (128.0, 0.0, False),
-        (100.0, -10.0, True),  # 10 to 110
-        (100.0, -30.0, False),  # 30 to 130
-        (100.0, 10.0, False),  # -10 to 90
+        (127.0, 0.0, 1.0, True),
+        (128.0, 0.0, 1.0, False),
+        (100.0, -10.0, 1.0, True),  # 10 to 110
+        (100.0, -30.0, 1.0, False),  # 30 to 130
+        (100.0, 10.0, 1.0, False),  # -10 to 90
+        (100.0, 0.0, 0.5, False),  # 200 steps
     ],
 )
-def test_a_range_that_seven_bits_reach(high: float, offset: float, good: bool) -> None:
-    text = f"S cannot reach its range [0|{high:g}] with 7 bits at 1 per bit"
-    one = signal(0.0, high, 1.0, offset, bits=7)
+def test_a_range_that_seven_bits_reach(
+    high: float, offset: float, scale: float, good: bool
+) -> None:
+    text = f"S cannot reach its range [0|{high:g}] with 7 bits at {scale:g} per bit"
+    one = signal(0.0, high, scale, offset, bits=7)
     assert magnitude_range(one) == (None if good else text)
 
 

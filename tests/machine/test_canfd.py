@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.layout import FD_LENGTHS
 from canshaper.machine.binding import load_deployment
-from tests.machine.gateway_files import problems as gateway_problems
+from tests.machine.gateway_files import changed
 from tests.rigs.files import ROOT, Machine, faults, machine_file
 from tests.rigs.sent import command_frame
 
@@ -128,11 +128,9 @@ FD_JOYSTICKS = ("channel: vcan0, bitrate: 250000", "channel: vcan0, bitrate: 250
 
 
 def test_a_gateway_has_can_fd_on_both_sides_and_passes_it_itself(tmp_path: Path) -> None:
-    (problem,) = gateway_problems(tmp_path, FD_MACHINE)
-    assert problem.partition(": ")[2] == (
-        "gateway.between: expected fd: true of both buses or of none, got it of one"
-    )
-    (problem,) = gateway_problems(tmp_path, FD_MACHINE, FD_JOYSTICKS)
+    one = changed(tmp_path, FD_MACHINE).faults()
+    assert one == ["gateway.between: expected fd: true of both buses or of none, got it of one"]
+    (problem,) = changed(tmp_path, FD_MACHINE, FD_JOYSTICKS).problems()
     assert problem.endswith(
         "gateway.forwarding: expected daemon with fd: true: our rules of can-gw pass classical"
         " frames only; got kernel"

@@ -41,7 +41,7 @@ def answers(machine: Machine, section: tuple[str, str, str], keys: str) -> list[
     """Problems of the machine with a section of these keys, without file and line."""
     _, before, text = section
     machine.in_yaml(before, text % f"{VALUES}, {keys}" + before)
-    return [one.partition(": ")[2] for one in machine.problems()]
+    return machine.faults()
 
 
 @pytest.mark.parametrize("section", [LOAD, PROFILE, RADIUS, FEEDBACK])
