@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import canshaper.config.schema  # noqa: F401  (its classes are the sections)
-from canshaper.cli.verbs.docs_and_config_schema import checksum_table, filter_table
+from canshaper.cli.verbs.config_schema import checksum_table, filter_table
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.commissioning.procedure.procedure import STEPS
@@ -28,9 +28,10 @@ from canshaper.shaping.registry import KINDS
 from canshaper.shaping.state_machine import transitions
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, Trust
 from tools.architecture import ring_rows
+from tools.claims import claim_rows
 from tools.frame_faults import FAULT_TEXTS, TRUST_TEXTS
 from tools.marks import marked, with_sections
-from tools.reactions import claim_rows, reaction_rows
+from tools.reactions import reaction_rows
 
 Key = TypeVar("Key", bound=IntEnum)
 ROOT = Path(__file__).parents[1]

@@ -136,7 +136,7 @@ def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
 def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
     """Let the three sockets receive these messages."""
     # If the DBC files have more ids than the kernel allows, the third socket receives them too. The
-    # controller tells them from unknown ids.
+    # controller distinguishes them from unknown ids.
     ours = ids.received | ids.sent
     all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]
     whole_kinds = ids.j1939 + len(SERVICES) * ids.canopen

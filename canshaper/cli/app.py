@@ -1,7 +1,4 @@
-"""The ``canshaper`` command: its verbs are the modules of ``canshaper.cli.verbs``.
-
-A module holds one verb, or several joined by ``_and_`` in its name; it is loaded when one is used.
-"""
+"""The ``canshaper`` command: each module of ``canshaper.cli.verbs`` is a verb, loaded on use."""
 
 import sys
 from collections.abc import Callable
@@ -38,9 +35,7 @@ class Verbs(TyperGroup):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        modules = [module.name for module in iter_modules(verbs.__path__)]
-        self._modules = {verb: name for name in modules for verb in name.split("_and_")}
-        names = sorted(verb.replace("_", "-") for verb in self._modules)
+        names = sorted(module.name.replace("_", "-") for module in iter_modules(verbs.__path__))
         self.commands = cast(Any, dict.fromkeys(names))  # each loaded when it is used
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -59,21 +54,18 @@ class Verbs(TyperGroup):
             rich_markup_mode=None,
             context_settings={"help_option_names": ["-h", "--help"]},
         )
-        verb = getattr(self._module(name), _word(name))
+        verb = getattr(_module(name), _word(name))
         checked = _linux_only(verb) if name in LINUX_ONLY else verb
         one.command(name, help=pasteable(verb.__doc__ or ""))(checked)
         self.commands[name] = typer.main.get_command(one)
         return self.commands[name]
-
-    def _module(self, name: str) -> Any:
-        return import_module(f"{verbs.__name__}.{self._modules[_word(name)]}")
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the verbs by group, each with its whole first sentence; click would shorten it."""
         rows: dict[str, list[tuple[str, str]]] = {group: [] for group in GROUPS}
         for name in self.commands:
             text = self.get_command(ctx, name).get_short_help_str(SENTENCE)
-            rows[self._module(name).GROUP].append((name, text))
+            rows[_module(name).GROUP].append((name, text))
         for group, title in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl(rows[group])
@@ -94,8 +86,12 @@ class Verbs(TyperGroup):
 
 
 def _word(name: str) -> str:
-    """Return the name of a verb in Python: that of its function."""
+    """Return the name of a verb in Python: that of its module and its function."""
     return name.replace("-", "_")
+
+
+def _module(name: str) -> Any:
+    return import_module(f"{verbs.__name__}.{_word(name)}")
 
 
 def pasteable(text: str) -> str:

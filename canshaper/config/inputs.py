@@ -246,7 +246,7 @@ class SwaySensorSection(NamedCodes, InputSection):
         None, description="signal of its figure of merit, as in SSI: 0 good, all else measures none"
     )
     kind: Kind
-    """What it measures: angle of a joint, inclination against the vertical, rate of a gyro."""
+    """Measured quantity: angle of a joint, inclination against the vertical, rate of a gyro."""
     fusion_s: (
         Annotated[
             float,

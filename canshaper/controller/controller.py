@@ -267,7 +267,7 @@ class Controller:
             protocol.invalidate(bus)
 
     def on_bus_off(self, bus: str) -> None:
-        """Tell the protocols that our CAN controller is off a bus, and misses frames there."""
+        """Report to the protocols that our CAN controller is bus-off and misses frames there."""
         for protocol in self._protocols:
             protocol.on_bus_off(bus)
 

@@ -32,7 +32,7 @@ class ControlServer:
 
     Args:
         path: path of the socket; its directory must exist.
-        mode: file mode of the socket. Whoever may write to it may change numbers of the machine.
+        mode: file mode of the socket. A user who may write to it may change numbers of the machine.
 
     Raises:
         OSError: the socket cannot be made, or another daemon answers at this path.

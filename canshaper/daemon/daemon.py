@@ -56,8 +56,7 @@ class Daemon:
 
     Raises:
         ConfigError: the deployment is not valid.
-        BusError: a bus cannot be opened, and no service manager started the daemon. Under a service
-            manager the daemon waits until the bus can be opened.
+        BusError: a bus cannot be opened. Under a service manager the daemon waits for it instead.
     """
 
     def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
@@ -92,11 +91,9 @@ class Daemon:
         log.info("memory=%s", f"not-locked ({why})" if (why := lock_memory()) else "locked")
         self._collector.freeze()
         # Most valves accept other commands only after a neutral one.
-        valves = self._send_neutral(wait=True)
+        valves, path = self._send_neutral(wait=True), self._controller.deployment.path
         self._black_box.begin(boottime_ns())
-        log.info(
-            "started file=%s axes=%s valves=%s", self._controller.deployment.path, names, valves
-        )
+        log.info("started file=%s axes=%s valves=%s", path, names, valves)
         self._reporter.identity()
         self._manager.ready(f"started, axes {names}")
         try:
@@ -128,11 +125,7 @@ class Daemon:
     # -- one tick ------------------------------------------------------------------------------
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        """Receive all waiting frames, tick the axes and send, then do the housekeeping.
-
-        Returns:
-            Whether the loop continues; False ends it, for good or for a new deployment.
-        """
+        """Run one tick; return False to end the loop, for good or for a new deployment."""
         io_cycle(self._recorder, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
@@ -209,12 +202,9 @@ class Daemon:
             self._follower = tick_follower(deployment, self._controller)
 
     def _apply(self, deployment: Deployment) -> bool:
-        """Replace the deployment if its buses can be opened.
+        """Replace the deployment if its buses can be opened; return whether it was replaced.
 
         Every axis is neutral and the tick is over, so to open a bus may take time.
-
-        Returns:
-            Whether the deployment was replaced, and so the loop has to begin again.
         """
         self._manager.reloading()
         self._reloads.ready = None
@@ -259,14 +249,10 @@ class Daemon:
     # -- ends ----------------------------------------------------------------------------------
 
     def _send_neutral(self, *, wait: bool = False) -> str:
-        """Send every valve neutral.
-
-        Args:
-            wait: whether to wait a moment until the frames are on their buses.
+        """Send every valve neutral; ``wait`` a moment until the frames are on their buses.
 
         Returns:
-            ``not-sent`` if a frame was not sent; otherwise ``sent``, or the result of ``seen_sent``
-            after a wait.
+            ``not-sent`` if a frame was not sent; else ``sent``, or after a wait see ``seen_sent``.
 
         Raises:
             Exception: a neutral frame could not be made; all others were sent first.

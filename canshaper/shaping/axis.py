@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from canshaper.errors import raised
-from canshaper.shaping.limits import FILTER_OUTPUT, OutputLimits, within
+from canshaper.shaping.limits import OutputLimits, within
 from canshaper.shaping.moving_axis import AddedTime
 from canshaper.shaping.output import OutputStage
 from canshaper.shaping.shapers.kind import Shaper, spreads
@@ -155,7 +155,7 @@ class ShapedAxis:
             if adds and damps_now and not held:
                 largest, (low, high) = stage.largest_added, self.bounds
                 low, high = max(low, -largest), min(high, largest)
-                damping = within(reference, low, high, 0.0, FILTER_OUTPUT)
+                damping = within(reference, low, high, 0.0, "filter output")
 
             if state in MOVING:
                 stage.drive(held, demand, reference, path, damping, sensor_damps=sensor_damps)

@@ -82,9 +82,6 @@ def _between(value: float, xs: Sequence[float], ys: Sequence[float], high: int) 
     return y0 + (value - x0) * (y1 - y0) / (x1 - x0)
 
 
-FILTER_OUTPUT = "filter output"
-
-
 @dataclass(frozen=True, slots=True)
 class OutputLimits:
     """Limits of one axis.

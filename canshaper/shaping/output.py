@@ -28,7 +28,6 @@ import math
 from dataclasses import dataclass
 
 from canshaper.shaping.limits import (
-    FILTER_OUTPUT,
     OutputLimits,
     RecentDemand,
     allowed_range,
@@ -151,7 +150,7 @@ class OutputStage:
         recent.add(demand)
         output.commanded = recent.low != 0.0 or recent.high != 0.0
         low, high = allowed_range(recent.low, recent.high, limits)
-        own = within(reference, low, high, limits.minimum, FILTER_OUTPUT)
+        own = within(reference, low, high, limits.minimum, "filter output")
 
         # 2. Small strokes
         if self._spreads:

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.cli.verbs import docs_and_config_schema as verb
+from canshaper.cli.verbs import docs as verb
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ import signal
 import sys
 from pathlib import Path
 from canshaper.cli.app import main
-from canshaper.cli.verbs import docs_and_config_schema as docs
+from canshaper.cli.verbs import docs
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 site = Path(sys.argv.pop())

@@ -21,7 +21,7 @@ from canshaper.checksums.kinds import (
     known_checksum,
     package_line,
 )
-from canshaper.cli.verbs.docs_and_config_schema import checksum_table
+from canshaper.cli.verbs.config_schema import checksum_table
 from canshaper.machine.identity import Identity
 from tests.codec.checksum_reference import REFERENCE
 from tests.rigs.files import ROOT

@@ -45,9 +45,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     @initialize(setup=st.sampled_from(SETUPS))
     def build(self, setup: Setup) -> None:
-        self.setup = setup
+        self.setup, self.wild = setup, Wild()
         self.limits = limits = setup.limits
-        self.wild = Wild()
         model = SwayModel(MODE, setup.tick_s) if setup.filter == "gff" else None
         shaper = self.shaper(model, (-5.655, -4.112))
         rest = {"neutral_band": BAND, "stop_s": setup.stop_s, "grid_steps": setup.steps}
@@ -63,14 +62,13 @@ class AxisUnderWatch(RuleBasedStateMachine):
         self.stop = max(1, round(setup.stop_s / setup.tick_s))
         self.joystick, self.added = CommandInput(), 0.0
         # the oracle's memory
-        self.now = 0
+        self.now = self.stop_from = 0
         self.armed = False  # joystick seen valid, enabled and neutral since it last was not usable
         # when which command was given by such a joystick, since the axis was at rest, and in all
         self.commanded: list[tuple[int, float]] = []
         self.demanded: list[tuple[int, float]] = []
         self.mixed = False  # something was added since the axis was at rest
         self.overtime = 0  # ticks for which nothing has moved it, beyond the tail
-        self.stop_from = 0
         self.enabled_before = self.reset_before = True
         self.tick()
 
@@ -173,12 +171,10 @@ class AxisUnderWatch(RuleBasedStateMachine):
         transition = axis.tick(joystick, self.added)
         if twin is not None:  # nothing that may be added to
             twin.tick(joystick)
-            assert (axis.state, axis.output.steps, axis.output.setpoint) == (
-                twin.state,
-                twin.output.steps,
-                twin.output.setpoint,
-            )
-            assert axis.output.applied == twin.output.applied == axis.output.setpoint
+            one, other = axis.output, twin.output
+            assert axis.state is twin.state
+            assert (one.steps, one.setpoint) == (other.steps, other.setpoint)
+            assert one.applied == other.applied == one.setpoint
         self.now += 1
         self.carried = self.added if adds and axis.state is State.ACTIVE else 0.0
         assert axis.output.applied == axis.output.setpoint - self.carried
@@ -207,16 +203,13 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def check_frame(self) -> None:
         """A frame that can be sent, the velocity that it gives, and a model that knows it."""
         axis, limits, steps = self.axis, self.limits, self.setup.steps
-        assert isinstance(axis.output.steps, int)
-        assert abs(axis.output.steps) <= steps
-        assert abs(axis.output.setpoint) <= limits.maximum
-        opened = max(0.0, abs(axis.output.steps) / steps - limits.deadband) / (
-            1.0 - limits.deadband
-        )
-        assert math.isclose(
-            axis.output.setpoint, math.copysign(opened, axis.output.steps), abs_tol=1e-12
-        )
-        assert (axis.output.steps == 0) == (axis.output.setpoint == 0.0)
+        out, sent = axis.output.steps, axis.output.setpoint
+        assert isinstance(out, int)
+        assert abs(out) <= steps
+        assert abs(sent) <= limits.maximum
+        opened = max(0.0, abs(out) / steps - limits.deadband) / (1.0 - limits.deadband)
+        assert math.isclose(sent, math.copysign(opened, out), abs_tol=1e-12)
+        assert (out == 0) == (sent == 0.0)
         if axis.sway is not None:
             assert math.isfinite(axis.sway.angle)
             assert (axis.sway.angle, axis.sway.rate) == (self.shadow.angle, self.shadow.rate)

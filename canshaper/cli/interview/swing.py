@@ -190,7 +190,7 @@ def load_of(
 def _possible(
     messages: Sequence[Message], used: Collection[str]
 ) -> tuple[dict[str, tuple[Message, Signal]], list[str]]:
-    """Return the signals that may tell the load, and the names of those that are named so."""
+    """Return the signals that may carry the load state, and those of them with such a name."""
     signals = {
         f"{message.name}.{signal.name}": (message, signal)
         for message, signal in suggest.loads(messages)
@@ -230,7 +230,7 @@ def _with_log(axes: Sequence[FirstAxis]) -> dict[str, float]:
 
 
 def code_meanings(signal: Signal, scaling: FirstScaling | None = None) -> dict[str, str]:
-    """Ask whether named values (VAL_) whose name does not tell are faults or measurements.
+    """Ask whether named values (VAL_) whose names leave it open are faults or measurements.
 
     ``scaling`` are the corrections of the signal from earlier answers.
     """

@@ -117,7 +117,7 @@ def be() -> None:
 
 
 def say_ready() -> None:
-    """Tell the parent that the work can begin."""
+    """Signal the parent that the work can begin."""
     print(READY, flush=True)
 
 

@@ -135,7 +135,7 @@ class Person(Protocol):
     """The person who is led through the steps."""
 
     def ready(self, words: str) -> None:
-        """Tell them what to do, and wait until they are about to do it."""
+        """Ask them to do a task, and wait until they are about to begin."""
 
     def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
         """Ask for a word, one of ``allowed`` where there are any; return it, or the default."""

@@ -1,4 +1,4 @@
-"""What a comparison shows: a row for each candidate, recommendations, the limits of any filter."""
+"""Summary of a comparison: a row for each candidate, recommendations, limits of any filter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -24,7 +24,8 @@ class Shaper(Protocol):
 
     A filter with a memory also has ``reset_to_steady_state(command)``: as if the command had long
     been there; and, where it can go on from another one of its class, ``copy_state(old)``. One
-    whose output is the command spread over time, with the same travel, has ``spreads = True``.
+    whose output has the travel of the command, spread over so many ticks that the valve cannot
+    resolve a tap, has ``spreads = True``: see ``small_strokes``.
     """
 
     def step(self, command: float) -> float:
