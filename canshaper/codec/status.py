@@ -74,8 +74,8 @@ def _applied_pct(one: Any) -> float:
 
 # Nothing here may be a lambda: a deployment is pickled by the process that has read it.
 AXIS_STATUS: list[StatusField[Any]] = [
-    StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State), "state"),
-    StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason), "its reason"),
+    StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State), "number, above"),
+    StatusField("Reason", attrgetter("reason"), _Code(Reason), True, max(Reason), "number, below"),
     StatusField("RawCommand", _command_pct, required=True, meaning="joystick, % of full speed"),
     StatusField("ShapedCommand", _applied_pct, required=True, meaning="valve, % of full speed"),
     StatusField(
