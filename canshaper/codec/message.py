@@ -194,7 +194,7 @@ class SequenceChecker:
     def __init__(self, protection: Protection, max_step: int | None, qualify: int) -> None:
         self._protection = protection
         self._range = protection.counts
-        self._max_step = max_step or min(USUAL_MAX_STEP, protection.counts // 2)
+        self.max_step = max_step or min(USUAL_MAX_STEP, protection.counts // 2)
         self._check = protection.check
         # Without a signal of its own, the counter is the one in the header of E2E.
         self._header: Any = None if protection.counter else protection.check
@@ -234,7 +234,7 @@ class SequenceChecker:
                 step = (count - last) % self._range
                 if step == 0:
                     return FrameFault.COUNTER_REPEATED
-                if step > self._max_step and not self._resynced:
+                if step > self.max_step and not self._resynced:
                     self._requalify()
                     return FrameFault.COUNTER_JUMP
             self._resynced = False

@@ -229,7 +229,7 @@ class ValveCodec:
         self.message = message
         self.steps = _steps(signal)
         self._signal = signal.name
-        self._zero, self._sign = _zero(signal), 1 if signal.scale > 0 else -1
+        self.zero, self.sign = _zero(signal), 1 if signal.scale > 0 else -1
         self._direction = direction
         self._negative = negative.name if negative else None
         self._also = [(s.name, _zero(s), _steps(s) * (1 if s.scale > 0 else -1)) for s in also]
@@ -249,7 +249,7 @@ class ValveCodec:
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command: expected up to +-{self.steps} steps, got {steps}")
         if self._plain:
-            raw[self._signal] = self._zero + self._sign * steps
+            raw[self._signal] = self.zero + self.sign * steps
             return
         size = steps
         if self._direction is not None:
@@ -257,21 +257,21 @@ class ValveCodec:
             size = abs(steps)
         elif self._negative is not None:
             size = max(steps, 0)
-            raw[self._negative] = self._zero + self._sign * max(-steps, 0)
-        raw[self._signal] = self._zero + self._sign * size
+            raw[self._negative] = self.zero + self.sign * max(-steps, 0)
+        raw[self._signal] = self.zero + self.sign * size
         for name, zero, full in self._also:
             raw[name] = zero + round(full * size / self.steps)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
         """Return the steps of the command in raw values; None where these are no valid command."""
-        steps = self._sign * (int(raw[self._signal]) - self._zero)
+        steps = self.sign * (int(raw[self._signal]) - self.zero)
         if self._direction is not None:
             sign = self._direction.read(raw)
             if sign is None or steps < 0:
                 return None
             steps *= sign
         elif self._negative is not None:
-            back = self._sign * (int(raw[self._negative]) - self._zero)
+            back = self.sign * (int(raw[self._negative]) - self.zero)
             if min(steps, back) != 0:
                 return None
             steps -= back

@@ -86,7 +86,7 @@ class MotionControl:
         luffing: AxisControl | None,
         tick_s: float,
     ) -> None:
-        self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
+        self._radius, self.circle_m, self.tick_s = radius, config.radius_m, tick_s
         slewing = slew.bound.config.slewing
         assert slewing is not None  # checked with the deployment
         slew.radius = radius
@@ -107,12 +107,12 @@ class MotionControl:
         self._apart = slew.bound.name  # what keeps the axes apart; at the start slew waits
         if self._near_far:
             self._near_far.bound(config)
-        self._motion = TwoAxisMotion(
+        self.motion = TwoAxisMotion(
             turning.moving, self._near_far.moving if self._near_far else None, config.max_path_m
         )
         if bending:
-            self._motion.luffing = bending.moving
-            self._motion.height_m = _full_speed_m_s(bending.control) / bending.moving.full_speed
+            self.motion.luffing = bending.moving
+            self.motion.height_m = _full_speed_m_s(bending.control) / bending.moving.full_speed
 
     def adjust(self) -> None:
         """Take over a changed full speed or fall of near-far."""
@@ -133,7 +133,7 @@ class MotionControl:
             The event, if the axes now move as one or no longer do; else None.
         """
         apart = ""
-        tick_s, members = self._tick_s, self._members
+        tick_s, members = self.tick_s, self._members
         for member in members:
             if member.control.alone:
                 self._end()
@@ -144,12 +144,12 @@ class MotionControl:
         for member in self._roped:  # its rope may have another length now
             member.moving.follow(member.moving.sway)
         tip_m = self._radius.fresh(now_ns) if self._radius else None
-        self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
+        self.motion.step((now - last) * tick_s, tip_m, self.circle_m)
         for member in members:
             moving, control = member.moving, member.control
             control.added, control.damps = moving.added, moving.damps
             control.displaced = moving.reached / moving.full_speed
-            if self._motion.unattended:
+            if self.motion.unattended:
                 control.axis.added_time.renew()
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
@@ -168,7 +168,7 @@ class MotionControl:
             self._end()
 
     def _end(self) -> None:
-        self._motion.stop()
+        self.motion.stop()
         for member in self._members:
             if not member.control.alone:
                 member.control.drop_added()

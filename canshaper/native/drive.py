@@ -226,8 +226,8 @@ def rows(controller: Controller) -> list[list[float]]:
 
 def _axis_row(control: AxisControl) -> list[float]:
     axis = control.axis
-    states, transfer, stage = axis._states, axis._transfer, axis._stage
-    shaper, sway, output, small = transfer._shaper, axis.sway, axis.output, stage._small
+    states, transfer, stage = axis.states, axis.transfer, axis.stage
+    shaper, sway, output, small = transfer.shaper, axis.sway, axis.output, stage.small
     twin = shaper._twin if isinstance(shaper, LimitAware) else None
     value = shaper._command if isinstance(shaper, Gff) else 0.0
     if isinstance(shaper, FirstOrder | SCurve):
@@ -278,9 +278,9 @@ def _axis_row(control: AxisControl) -> list[float]:
 
 
 def _motion_row(control: MotionControl) -> list[float]:
-    motion = control._motion
+    motion = control.motion
     radius = motion._radius_m
     row = [motion._weight, -1.0 if radius is None else radius]
-    for one in (motion._slew, motion._near_far):
+    for one in (motion.slew, motion.near_far):
         row += [one.added, one.reached, one.way, one.ahead_s, one.joins] if one else [0.0] * 5
     return [float(one) for one in row]

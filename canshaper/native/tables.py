@@ -31,23 +31,27 @@ from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 from canshaper.shaping.transfer import Off
 
-Numbers = dict[str, Any]
-"""A struct of the tables: values by member; an absent member is 0."""
+Numbers = dict[str, Any]  # a struct of the tables: values by member; an absent member is 0
 Refusals = Iterator[tuple[Place, str]]
-_PROTECTED = ("checksum", "e2e", "multiplexor", "source")
-NOT_EXPORTED: dict[Place, tuple[str, ...]] = {
-    (): ("switches", "hydraulics", "gateway", "emergency_stop", "load_state", "profile"),
-    ("buses", "*"): ("canopen", "j1939"),
-    ("joysticks", "*"): (*_PROTECTED, "enable_of", "next_profile", "node"),
-    ("axes", "*"): ("sway_sensor", "gain_schedule", "profiles"),
-    ("axes", "*", "command"): ("flags", "negative"),
-    ("axes", "*", "valve"): ("direction", "also", "cia408", "node", *_PROTECTED[:3]),
-    ("axes", "*", "sway"): ("length",),
-    ("axes", "*", "limits"): ("ends",),
-    ("motion", "*"): ("luffing",),
-    ("motion", "*", "radius"): _PROTECTED,
+_MESSAGE = "bus message alive_counter cycle_ms timeout_ms"
+EXPORTED: dict[Place, str] = {
+    (): "version tick_ms tick buses dbc joysticks axes motion status identity control assumed crane"
+    " still_deg uncertainty accept",
+    ("buses", "*"): "interface channel bitrate fd data_bitrate options match unconfirmed network",
+    ("joysticks", "*"): f"{_MESSAGE} alive_max_step qualify enable reset anti_sway_off stuck_s",
+    ("axes", "*"): "command valve feedback status sway slewing filter limits",
+    ("axes", "*", "command"): "signal full zero invert joystick codes neutral_pct",
+    ("axes", "*", "valve"): f"{_MESSAGE} signal full zero invert",
+    ("axes", "*", "sway"): "full_speed_m_s length_m damping_nms mass_kg period_s damping_ratio"
+    " decay_per_swing origin",
+    ("axes", "*", "limits"): "max_pct min_pct rise_per_s fall_per_s deadband_pct curve_command_pct"
+    " curve_speed_pct curve_origin tail_s stop_s stop_distance_m allow_faster allow_reverse"
+    " reversal reversal_s",
+    ("axes", "*", "slewing"): "full_speed_rad_s largest_radius_m",
+    ("motion", "*"): "slew near_far radius radius_m max_pct max_path_m max_s aim waits",
+    ("motion", "*", "radius"): f"{_MESSAGE} alive_max_step qualify signal codes",
 }
-"""Keys of the file that the C does not support, by their sections."""
+"""Keys of the file that the C follows, or that no valve frame hangs on, by their sections."""
 KINDS: dict[type, str] = {
     Off: "CS_OFF",
     Fir: "CS_FIR",
@@ -58,7 +62,6 @@ KINDS: dict[type, str] = {
 }
 """Filters of the C, by their classes in Python."""
 MOST_BITS = 24  # most bits of a signal: more are not exact in float
-NONE = -1
 UNLIMITED_TICKS = 2_000_000_000  # no limit: the C counts less
 
 
@@ -69,8 +72,7 @@ def tables(deployment: Deployment) -> Numbers:
         ConfigError: names every key that the C does not support.
     """
     controller = Controller(deployment)
-    problems = [deployment.source.problem(*one) for one in _refused(deployment, controller)]
-    if problems:
+    if problems := [deployment.source.problem(*one) for one in _refused(deployment, controller)]:
         raise ConfigError(problems)
     buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
     axes = controller.axes
@@ -98,11 +100,11 @@ def tables(deployment: Deployment) -> Numbers:
 
 def _refused(deployment: Deployment, controller: Controller) -> Refusals:
     """Yield each place that the C does not support, and what was expected there."""
-    for pattern, keys in NOT_EXPORTED.items():
+    for pattern, keys in EXPORTED.items():
         for place, section in _sections((), deployment.config, pattern):
-            for key in keys:
-                value = getattr(section, key)
-                if value or (value == 0 and value is not False):
+            for key, value in section:
+                default = type(section).model_fields[key].get_default(call_default_factory=True)
+                if key not in keys.split() and value != default:
                     yield (*place, key), "expected none in an export, for which C has no part"
     for name, joystick in deployment.joysticks.items():
         config, place = joystick.config, ("joysticks", name)
@@ -114,8 +116,8 @@ def _refused(deployment: Deployment, controller: Controller) -> Refusals:
     for name, axis in deployment.axes.items():
         written = [axis.config.valve.signal, axis.valve.message.protection.counter]
         yield from _unreadable(("axes", name, "valve"), axis.valve_message, written)
-        shaper = controller.axes[name].axis._transfer._shaper
-        inner = shaper._shaper if isinstance(shaper, LimitAware) else shaper
+        shaper = controller.axes[name].axis.transfer.shaper
+        inner = shaper.shaper if isinstance(shaper, LimitAware) else shaper
         if type(shaper) not in KINDS or type(inner) not in KINDS:
             text = f"expected a filter that C has, got {axis.config.filter.kind}"
             yield ("axes", name, "filter", "kind"), text
@@ -129,12 +131,11 @@ def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Plac
     """Yield the sections that match a pattern, with their places; * matches every name."""
     if not pattern:
         yield place, section
-    elif section is not None:
-        key, rest = pattern[0], pattern[1:]
-        named = section.items() if key == "*" else [(key, getattr(section, str(key)))]
-        for name, one in named:
-            if one is not None:
-                yield from _sections((*place, name), one, rest)
+        return
+    key, rest = pattern[0], pattern[1:]
+    for name, one in section.items() if key == "*" else [(key, getattr(section, str(key)))]:
+        if one is not None:
+            yield from _sections((*place, name), one, rest)
 
 
 def _unreadable(place: Place, message: Message, names: Iterable[str | None]) -> Refusals:
@@ -168,7 +169,7 @@ def _message(bound: BoundInput, buses: list[str]) -> Numbers:
         **_key(bound.key, bound.message.length, buses),
         "counter": _field(bound.message, protection.counter),
         "counts": protection.counts,
-        "max_step": sequence._max_step,
+        "max_step": sequence.max_step,
         "qualify": config.qualify,
         "timeout_ns": config.timeout_ms * 1_000_000,
     }
@@ -221,53 +222,52 @@ def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) 
         "number": [*_velocities(deployment, command.joystick)].index(command.signal),
         "period_ticks": control.period_ticks,
         "setpoint": _field(bound.valve_message, bound.config.valve.signal),
-        "zero": valve._zero,
-        "sign": valve._sign,
+        "zero": valve.zero,
+        "sign": valve.sign,
     }
 
 
 def _filter(axis: ShapedAxis) -> Numbers:
     """Return sway model and filter of an axis."""
-    transfer, sway = axis._transfer, axis.sway
-    shaper = transfer._shaper
-    numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis._tick_s, "fade": transfer._fade}
+    transfer, sway = axis.transfer, axis.sway
+    shaper = transfer.shaper
+    numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis.tick_s, "fade": transfer.fade}
     if sway is not None:
         numbers |= {"sways": True, **{n: getattr(sway, n) for n in ("f11", "f12", "f21", "f22")}}
-    fir = shaper._shaper if isinstance(shaper, LimitAware) else shaper
-    gff = shaper._gff if isinstance(shaper, LimitAware) else shaper
+    fir, gff = (shaper.shaper, shaper.gff) if isinstance(shaper, LimitAware) else (shaper, shaper)
     if isinstance(fir, Fir):
         pairs = enumerate(pairwise((*fir.taps, math.inf)), 1)
         runs = [{"end": end, "tap": tap} for end, (tap, following) in pairs if tap != following]
         numbers |= {"runs": runs, "runs_n": len(runs), "taps_n": len(fir.taps)}
     if isinstance(gff, Gff):
-        numbers |= {"k1": gff.k1, "k2": gff.k2, "share": gff._share}
+        numbers |= {"k1": gff.k1, "k2": gff.k2, "share": gff.share}
     if isinstance(shaper, FirstOrder):
-        numbers["share"] = shaper._share
+        numbers["share"] = shaper.share
     if isinstance(shaper, SCurve):
-        numbers |= {"rate": shaper._rate, "change": shaper._jerk * shaper._tick_s}
+        numbers |= {"rate": shaper.rate, "change": shaper.jerk * shaper.tick_s}
     return numbers
 
 
 def _limits(axis: ShapedAxis) -> Numbers:
     """Return limits of an axis, and what a motion may add to it."""
-    stage, limits = axis._stage, axis._stage.limits
+    stage, limits = axis.stage, axis.stage.limits
     numbers: Numbers = {
-        "neutral_band": axis._neutral_band,
-        **dict(zip(("rise", "fall"), stage._rates, strict=True)),
-        "steps": stage._grid_steps,
+        "neutral_band": axis.neutral_band,
+        **dict(zip(("rise", "fall"), stage.rates, strict=True)),
+        "steps": stage.grid_steps,
         "tail": stage.tail,
-        "reversal": min(stage._reversal, UNLIMITED_TICKS),
-        "stop_ticks": axis._states._stop_ticks,
-        "spreads": stage._spreads,
-        "small_least": stage._small._least,
-        "small_most": stage._small._most,
+        "reversal": min(stage.reversal, UNLIMITED_TICKS),
+        "stop_ticks": axis.states.stop_ticks,
+        "spreads": stage.spreads,
+        "small_least": stage.small.least,
+        "small_most": stage.small.most,
         "largest_added": float(stage.largest_added),
-        "added_ticks": axis.added_time._ticks,
+        "added_ticks": axis.added_time.ticks,
     }
     same = ("maximum", "minimum", "fall_per_s", "deadband", "run_on", "allow_faster")
     numbers |= {name: getattr(limits, name) for name in (*same, "allow_reverse")}
     if curve := limits.curve:
-        numbers |= {"curve_command": [*curve._commands], "curve_speed": [*curve.speeds]}
+        numbers |= {"curve_command": [*curve.commands], "curve_speed": [*curve.speeds]}
         numbers["curve_n"] = len(curve.speeds)
     return numbers
 
@@ -276,16 +276,16 @@ def _motion(
     deployment: Deployment, name: str, control: MotionControl, axes: list[str], buses: list[str]
 ) -> Numbers:
     """Return the members of ``cs_motion_config``."""
-    bound, motion = deployment.motions[name], control._motion
+    bound, motion = deployment.motions[name], control.motion
     config, near_far = bound.config, bound.config.near_far
-    members = [one for one in (motion._slew, motion._near_far) if one]
+    members = [one for one in (motion.slew, motion.near_far) if one]
     same = ("full_speed", "period_s", "stiffness", "damping", "lag_s", "farthest", "fall_per_s")
     numbers: Numbers = {
         "slew": axes.index(config.slew),
-        "near_far": axes.index(near_far) if near_far else NONE,
-        "path_m": motion._path_m,
-        "circle_m": control._circle_m or 0.0,
-        "tick_s": control._tick_s,
+        "near_far": axes.index(near_far) if near_far else -1,  # none
+        "path_m": motion.path_m,
+        "circle_m": control.circle_m or 0.0,
+        "tick_s": control.tick_s,
         "moving": [
             {**{n: getattr(one, n) for n in same}, "bounded": one.farthest < math.inf}
             for one in members

@@ -76,28 +76,28 @@ class ShapedAxis:
         self.scale = 1.0
         self.bounds = -math.inf, math.inf
         self.error = ""
-        self._tick_s = tick_s
-        self._neutral_band = neutral_band
-        self._states = StateMachine(neutral_band, max(1, round(stop_s / tick_s)))
-        self._transfer = BumplessTransfer(shaper, tick_s)
-        self._stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
-        self.output = self._stage.output
-        self.added_time = AddedTime(0, self._stage.tail)
+        self.tick_s = tick_s
+        self.neutral_band = neutral_band
+        self.states = StateMachine(neutral_band, max(1, round(stop_s / tick_s)))
+        self.transfer = BumplessTransfer(shaper, tick_s)
+        self.stage = OutputStage(limits, grid_steps, tick_s, spreads=spreads(shaper))
+        self.output = self.stage.output
+        self.added_time = AddedTime(0, self.stage.tail)
 
     @property
     def state(self) -> State:
         """State of the axis."""
-        return self._states.state
+        return self.states.state
 
     @property
     def reason(self) -> Reason:
         """Reason for which the axis is in its state."""
-        return self._states.reason
+        return self.states.reason
 
     @property
     def neutral(self) -> bool:
         """Whether the valve gets neutral in this state, whatever the filter asks for."""
-        return self._states.state not in MOVING
+        return self.states.state not in MOVING
 
     def tick(self, joystick: CommandInput, added: float = 0.0) -> Transition | None:
         """Run a whole tick: ``command`` and ``propagate``."""
@@ -121,7 +121,7 @@ class ShapedAxis:
         Returns:
             The change of state of this tick, or in TRIPPED the first error of the filter; or None.
         """
-        states, stage = self._states, self._stage
+        states, stage = self.states, self.stage
         old, size = states.state, abs(joystick.command)
         sensor_damps = self.sensed is not None and self.sensed.weight > 0.0
         damps_now = may_add = False
@@ -130,7 +130,7 @@ class ShapedAxis:
             if not joystick.bypass:
                 damps_now = damps and sensor_damps and not commanded
                 asked = added != 0.0 or damps_now
-            may_add = self.added_time.allows(asked, commanded, moved, size > self._neutral_band)
+            may_add = self.added_time.allows(asked, commanded, moved, size > self.neutral_band)
 
         at_rest = self.output.steps == 0 and not self.output.commanded
         state = states.step(joystick, at_rest, may_add)
@@ -141,17 +141,17 @@ class ShapedAxis:
             if state is ACTIVE or state is BYPASS_ON:
                 if not size < math.inf:  # the value would stay in the memory of the filter
                     raise ValueError(f"command is {joystick.command}")
-                if size > self._neutral_band:
+                if size > self.neutral_band:
                     held, (low, high) = joystick.command, self.bounds
                     # In bypass the crane is as it is.
                     demand = self.scale * min(max(held, low), high) if state is ACTIVE else held
-            elif state is STOPPING and size > self._neutral_band:
+            elif state is STOPPING and size > self.neutral_band:
                 stage.stop_against(joystick.command)
             self.demand = demand
 
             adds = may_add and state is ACTIVE
             path = added if adds or (self.bends and state is ACTIVE) else 0.0
-            reference = self._transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
+            reference = self.transfer.unlimited(demand, stage.limits.maximum, stage.ramp, path)
             if adds and damps_now and not held:
                 largest, (low, high) = stage.largest_added, self.bounds
                 low, high = max(low, -largest), min(high, largest)
@@ -161,7 +161,7 @@ class ShapedAxis:
                 stage.drive(held, demand, reference, path, damping, sensor_damps=sensor_damps)
             else:
                 stage.rest()
-                self._transfer.offset = 0.0
+                self.transfer.offset = 0.0
         except Exception as error:  # a filter of another package may raise anything
             return self.invalidate(old, error)
         return None if state is old else Transition(old, state, states.reason)
@@ -181,15 +181,15 @@ class ShapedAxis:
         each of them. Only the ramp does not catch up.
         """
         demand, output, time = self._clamped_demand(), self.output, self.added_time
-        self._states.hold(ticks)
-        self._stage.hold(demand, ticks)
+        self.states.hold(ticks)
+        self.stage.hold(demand, ticks)
         time.allows(time.asked, output.commanded, output.steps != 0, ticks=ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
-                self._transfer.hold(demand)
+                self.transfer.hold(demand)
                 self.propagate()
         except Exception as error:  # as in ``command``
-            return self.invalidate(self._states.state, error)
+            return self.invalidate(self.states.state, error)
         return None
 
     def retune(
@@ -206,40 +206,40 @@ class ShapedAxis:
         """
         before = self.sway
         applied = self.output.applied
-        sway = before.retuned(mode, applied) if before else SwayModel(mode, self._tick_s)
+        sway = before.retuned(mode, applied) if before else SwayModel(mode, self.tick_s)
         if past:
             sway.angle = sway.rate = 0.0
             for velocity in past:
                 sway.step(velocity)
         shaper = shaper_for(sway)
-        self._transfer.replace(shaper, self._clamped_demand(), again=bool(past))
-        self._stage.change_filter(spreads=spreads(shaper))
+        self.transfer.replace(shaper, self._clamped_demand(), again=bool(past))
+        self.stage.change_filter(spreads=spreads(shaper))
         self.sway = sway
         if self.sensed is not None:
             self.sensed.retune(sway)
 
     def prepare(self, least: float, most: float) -> None:
         """Prepare the filter, which has not run, for ``follow`` with factors from least to most."""
-        self._transfer.prepare(least, most)
+        self.transfer.prepare(least, most)
 
     def follow(self, mode: SwayMode, factor: float) -> None:
         """Continue with another rope length; ``factor``: its period over that of the filter."""
         assert self.sway is not None  # checked with the deployment
         self.sway.follow(mode)
-        self._transfer.follow(factor)
+        self.transfer.follow(factor)
 
     def allow_added(self, largest: float, time_s: float) -> None:
         """Let a motion of two axes move this one while no one commands it, within both limits."""
-        self._stage.largest_added = largest
-        self.added_time = AddedTime(round(time_s / self._tick_s), self._stage.tail)
+        self.stage.largest_added = largest
+        self.added_time = AddedTime(round(time_s / self.tick_s), self.stage.tail)
 
     def drop_added(self) -> None:
         """End the added velocity at once: the motion has lost the right to move this axis."""
-        self._stage.drop_added()
+        self.stage.drop_added()
 
     def restore(self, state: State, reason: Reason) -> None:
         """Continue in a state with neutral output (``StateMachine.restore``)."""
-        self._states.restore(state, reason)
+        self.states.restore(state, reason)
 
     def limit(self, limits: OutputLimits) -> None:
         """Change maximum and rates, but not the tail.
@@ -249,22 +249,22 @@ class ShapedAxis:
         """
         if not self.neutral:
             raise ValueError("limits change in neutral only")
-        self._stage.change_limits(limits)
+        self.stage.change_limits(limits)
 
     def _entered(self, state: State, old: State) -> None:
-        self._transfer.entered(state, old)
+        self.transfer.entered(state, old)
         if state is not ACTIVE:
-            self._stage.interrupt_stroke()
+            self.stage.interrupt_stroke()
         elif old is BYPASS_ON:
-            self._stage.hold_run_on()
+            self.stage.hold_run_on()
         if old in MOVING and state not in MOVING and self.output.commanded:
-            self._stage.hold_run_on()
+            self.stage.hold_run_on()
         if old is TRIPPED:
             self.error = ""
 
     def _clamped_demand(self) -> float:
         """Return the last demand as the filter got it, clamped to the maximum."""
-        return within(self.demand, -self._stage.limits.maximum, self._stage.limits.maximum, 0.0)
+        return within(self.demand, -self.stage.limits.maximum, self.stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:
         """Trip for an error of the filter, or an output that no frame carries.
@@ -273,12 +273,12 @@ class ShapedAxis:
 
         In TRIPPED the first reason stays, and the first error is reported, not one in each tick.
         """
-        if self._states.state is not TRIPPED:
-            self._states.trip(Reason.OUTPUT_INVALID)
-        self._transfer.offset = 0.0
+        if self.states.state is not TRIPPED:
+            self.states.trip(Reason.OUTPUT_INVALID)
+        self.transfer.offset = 0.0
         if self.output.commanded:
-            self._stage.hold_run_on()
-        self._stage.rest()
+            self.stage.hold_run_on()
+        self.stage.rest()
         self.demand = 0.0
         if self.sway is not None:
             self.sway.angle = self.sway.rate = 0.0
@@ -287,4 +287,4 @@ class ShapedAxis:
         if self.error:
             return None
         self.error = raised(error)
-        return Transition(old, TRIPPED, self._states.reason, self.error)
+        return Transition(old, TRIPPED, self.states.reason, self.error)

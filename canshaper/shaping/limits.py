@@ -27,19 +27,19 @@ class ValveCurve:
         ValueError: the points are no such curve.
     """
 
-    __slots__ = ("_commands", "speeds")
+    __slots__ = ("commands", "speeds")
 
     def __init__(self, commands: Sequence[float], speeds: Sequence[float]) -> None:
         if fault := next(_faults(commands, speeds), None):
             raise ValueError(fault)
-        self._commands = tuple(commands)
+        self.commands = tuple(commands)
         self.speeds = tuple(speeds)
 
     def command(self, velocity: float) -> float:
         """Return the command for a velocity; full command beyond what the valve gives."""
         if velocity == 0.0:
             return 0.0
-        speeds, commands = self.speeds, self._commands
+        speeds, commands = self.speeds, self.commands
         if velocity >= speeds[-1]:
             return commands[-1]
         if velocity <= speeds[0]:
@@ -49,7 +49,7 @@ class ValveCurve:
 
     def velocity(self, command: float) -> float:
         """Velocity that a command gives; zero within the dead band."""
-        speeds, commands = self.speeds, self._commands
+        speeds, commands = self.speeds, self.commands
         if command >= commands[-1]:
             return speeds[-1]
         if command <= commands[0]:

@@ -148,17 +148,17 @@ class AddedTime:
         unattended: whether the joystick rested longer than the tail, in any state of the axis.
     """
 
-    __slots__ = ("_left", "_rested", "_ticks", "_unattended", "asked", "unattended")
+    __slots__ = ("_left", "_rested", "_unattended", "asked", "ticks", "unattended")
 
     def __init__(self, ticks: int, tail: int) -> None:
-        self._ticks = self._left = ticks
+        self.ticks = self._left = ticks
         self._unattended = tail + UNATTENDED_TICKS
         self.asked = self.unattended = False
         self._rested = 0  # ticks since the joystick was deflected
 
     def renew(self) -> None:
         """Give the axis its full time back, because no joystick of its motion is deflected."""
-        self._left = self._ticks
+        self._left = self.ticks
 
     def allows(
         self, asked: bool, commanded: bool, moved: bool, deflected: bool = False, ticks: int = 1
@@ -177,7 +177,7 @@ class AddedTime:
         self._rested = 0 if deflected else self._rested + ticks
         self.unattended = self._rested > self._unattended
         if commanded:
-            self._left = self._ticks
+            self._left = self.ticks
         elif moved:
             self._left -= ticks
         return asked and self._left > 0

@@ -89,9 +89,9 @@ class OutputStage:
 
     # fmt: off
     __slots__ = (
-        "_carry", "_crossed", "_demanded", "_dropped_at", "_grid_steps", "_no_run_on", "_own_ramp",
-        "_ran", "_rates", "_recent", "_reversal", "_side", "_small", "_spreads", "_tick_s",
-        "largest_added", "limits", "output", "ramp", "tail",
+        "_carry", "_crossed", "_demanded", "_dropped_at", "_no_run_on", "_own_ramp", "_ran",
+        "_recent", "_side", "_tick_s", "grid_steps", "largest_added", "limits", "output", "ramp",
+        "rates", "reversal", "small", "spreads", "tail",
     )
     # fmt: on
 
@@ -100,7 +100,7 @@ class OutputStage:
     ) -> None:
         self.output = Output()
         self.ramp = self.largest_added = 0.0
-        self._grid_steps, self._tick_s, self._spreads = grid_steps, tick_s, spreads
+        self.grid_steps, self._tick_s, self.spreads = grid_steps, tick_s, spreads
         self.tail = round(limits.tail_s / tick_s)  # ticks
         self._recent = RecentDemand(self.tail)
         self._demanded = RecentDemand(self.tail)  # the same, but no rest ends it
@@ -153,8 +153,8 @@ class OutputStage:
         own = within(reference, low, high, limits.minimum, "filter output")
 
         # 2. Small strokes
-        if self._spreads:
-            movement = self._small.output(demand, output.applied, own, low, high)
+        if self.spreads:
+            movement = self.small.output(demand, output.applied, own, low, high)
             if not sensor_damps:
                 own = movement
 
@@ -163,7 +163,7 @@ class OutputStage:
         if self.largest_added:
             self._demanded.add(demand)
         if not added and self._own_ramp == self.ramp and not self._dropped_at:
-            self.ramp = self._own_ramp = rate_limited(own, self.ramp, *self._rates)
+            self.ramp = self._own_ramp = rate_limited(own, self.ramp, *self.rates)
         elif abs(path) <= 1.0:
             total, low, high = self._ramp_with_added(held, own, added, no_run_on=no_run_on)
         else:
@@ -177,7 +177,7 @@ class OutputStage:
             high = ramp
         output.path, output.damping = path, damping
         output.steps, output.setpoint = on_grid(
-            ramp, low, high, limits.deadband, self._grid_steps, curve=limits.curve
+            ramp, low, high, limits.deadband, self.grid_steps, curve=limits.curve
         )
         output.applied = output.setpoint - path
         if added:
@@ -203,12 +203,12 @@ class OutputStage:
         target = total = own
         if added:
             total = within(own + added, low, high, 0.0)
-            step = 1.0 / self._grid_steps
+            step = 1.0 / self.grid_steps
             target = within(total, low, high, max(limits.minimum, 0.5 * step))
             if target:
                 target = within(target + within(self._carry, -step, step, 0.0), low, high, 0.0)
-        self._own_ramp = rate_limited(own, self._own_ramp, *self._rates)
-        self.ramp = rate_limited(target, self.ramp, *self._rates)
+        self._own_ramp = rate_limited(own, self._own_ramp, *self.rates)
+        self.ramp = rate_limited(target, self.ramp, *self.rates)
         if self._dropped_at * self.ramp < 0.0:  # the way to the other side begins at rest
             self.ramp = 0.0
         self._dropped_at = 0.0
@@ -224,7 +224,7 @@ class OutputStage:
         recent = self._recent
         if held * self._side < 0.0:
             self._side, self._crossed = -self._side, 0
-        if self._crossed >= self._reversal and (recent.low if self._side > 0.0 else recent.high):
+        if self._crossed >= self.reversal and (recent.low if self._side > 0.0 else recent.high):
             recent.clear_against(self._side)
         self._crossed += 1
         beyond, limits = self._beyond(held), self.limits
@@ -250,7 +250,7 @@ class OutputStage:
         """End the run-on of a stop held against, by the fall, or after the time of a reversal."""
         if held * self._side < 0.0:
             self._side, self._crossed = -self._side, 0
-        if not self._reversal and held * self.ramp < 0.0:
+        if not self.reversal and held * self.ramp < 0.0:
             self._recent.clear()
             self.output.commanded = False
 
@@ -266,7 +266,7 @@ class OutputStage:
             output.commanded = False
         if self.largest_added:
             self._demanded.add(0.0)
-        self._small.clear()
+        self.small.clear()
         output.steps = 0
         output.setpoint = output.path = output.damping = output.applied = 0.0
         self.ramp = self._own_ramp = self._carry = self._dropped_at = 0.0
@@ -279,22 +279,22 @@ class OutputStage:
         self._no_run_on -= ticks
         self._crossed += ticks
         self._ran += self._beyond(0.0) * ticks * self._tick_s
-        self._small.hold(demand, self.output.applied, ticks)
+        self.small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:
         """Use other limits from now on, at rest. Demands within the tail still count."""
         self.limits = limits
-        self._rates = limits.rise_per_s * self._tick_s, limits.fall_per_s * self._tick_s
+        self.rates = limits.rise_per_s * self._tick_s, limits.fall_per_s * self._tick_s
         fall_s = limits.maximum / limits.fall_per_s
         reversal = int(max(limits.reversal_s - fall_s, 0.0) / self._tick_s + 1e-6)
-        self._reversal = math.inf if limits.allow_reverse else reversal  # ticks
-        self._small = SmallStrokes(limits, self._grid_steps, self._tick_s)
+        self.reversal = math.inf if limits.allow_reverse else reversal  # ticks
+        self.small = SmallStrokes(limits, self.grid_steps, self._tick_s)
 
     def change_filter(self, *, spreads: bool) -> None:
         """Continue with another filter; a stroke under way, of the old one, counts as not small."""
-        self._spreads = spreads
-        self._small.lose()
+        self.spreads = spreads
+        self.small.lose()
 
     def interrupt_stroke(self) -> None:
         """Treat no stroke as small until the axis rests: the filter no longer shapes it."""
-        self._small.lose()
+        self.small.lose()

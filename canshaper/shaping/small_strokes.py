@@ -28,18 +28,18 @@ class SmallStrokes:
         tick_s: time between two ticks.
     """
 
-    __slots__ = ("_due", "_least", "_left", "_maximum", "_most")
+    __slots__ = ("_due", "_left", "_maximum", "least", "most")
 
     def __init__(self, limits: OutputLimits, grid_steps: int, tick_s: float) -> None:
-        self._least = least_velocity(limits, grid_steps)
+        self.least = least_velocity(limits, grid_steps)
         self._maximum = limits.maximum
-        self._most = SMALL_S / tick_s * self._least
+        self.most = SMALL_S / tick_s * self.least
         self._due = 0.0  # full speed times ticks
-        self._left = self._most  # until what was commanded is no longer small; the same
+        self._left = self.most  # until what was commanded is no longer small; the same
 
     def clear(self) -> None:
         """Forget the travel that is due: the axis rests."""
-        self._due, self._left = 0.0, self._most
+        self._due, self._left = 0.0, self.most
 
     def lose(self) -> None:
         """Treat no stroke as small until the axis rests: the filter did not see its commands."""
@@ -83,7 +83,7 @@ class SmallStrokes:
 
     def _forth(self, target: float, due: float, most: float) -> float:
         """Return the velocity of a small stroke in positive direction."""
-        least = self._least
+        least = self.least
         return max(min(least, most), min(target, due)) if due > LEFT * least else 0.0
 
 

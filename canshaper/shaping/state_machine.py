@@ -148,19 +148,19 @@ class StateMachine:
 
     __slots__ = (
         "_neutral_band",
-        "_stop_ticks",
         "_stopping",
         "_was_enabled",
         "_was_reset",
         "reason",
         "state",
+        "stop_ticks",
     )
 
     def __init__(self, neutral_band: float, stop_ticks: int) -> None:
         self.state = NEUTRAL_WAIT
         self.reason = Reason.START
         self._neutral_band = neutral_band
-        self._stop_ticks = stop_ticks
+        self.stop_ticks = stop_ticks
         self._stopping = 0  # ticks in STOPPING
         # A switch that is on at the start was not pressed.
         self._was_enabled = True
@@ -201,7 +201,7 @@ class StateMachine:
             self._was_enabled = enabled or fault in SWITCHES_UNKNOWN
         if state is STOPPING:
             self._stopping += 1
-            if self._stopping >= self._stop_ticks:
+            if self._stopping >= self.stop_ticks:
                 holding |= STOP_OVER
 
         for when, new, why in TABLE[state]:

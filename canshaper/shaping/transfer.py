@@ -42,11 +42,11 @@ class BumplessTransfer:
             motion to join.
     """
 
-    __slots__ = ("_bypassed", "_fade", "_joins", "_shaper", "offset")
+    __slots__ = ("_bypassed", "_joins", "fade", "offset", "shaper")
 
     def __init__(self, shaper: Shaper, tick_s: float) -> None:
-        self._shaper = shaper
-        self._fade = math.exp(-tick_s / BLEND_S)
+        self.shaper = shaper
+        self.fade = math.exp(-tick_s / BLEND_S)
         self.offset = 0.0
         self._joins = False  # whether the next demand sets the offset
         self._bypassed = False
@@ -71,31 +71,31 @@ class BumplessTransfer:
         """
         if abs(demand) > maximum:
             demand = math.copysign(maximum, demand)
-        output = self._shaper.step(demand)
+        output = self.shaper.step(demand)
         if self._bypassed:
             output = demand
         if self._joins:
             self._joins = False
             self.offset = ramp - output - added
         elif self.offset:
-            self.offset *= self._fade
+            self.offset *= self.fade
             if abs(self.offset) < 1e-6:  # far below any frame's resolution
                 self.offset = 0.0
         return output + self.offset
 
     def hold(self, demand: float) -> None:
         """Count a missed tick with this demand."""
-        self._shaper.step(demand)
+        self.shaper.step(demand)
 
     def prepare(self, least: float, most: float) -> None:
         """Prepare the filter for ``follow`` from least to most."""
-        assert isinstance(self._shaper, Following)  # checked with the deployment
-        self._shaper.prepare(least, most)
+        assert isinstance(self.shaper, Following)  # checked with the deployment
+        self.shaper.prepare(least, most)
 
     def follow(self, factor: float) -> None:
         """Let the filter follow the sway model to ``factor`` times the period of the file."""
-        assert isinstance(self._shaper, Following)
-        self._shaper.follow(factor)
+        assert isinstance(self.shaper, Following)
+        self.shaper.follow(factor)
 
     def replace(self, shaper: Shaper, demand: float, *, again: bool) -> None:
         """Continue with another filter.
@@ -105,8 +105,8 @@ class BumplessTransfer:
             demand: the present demand.
             again: whether the sway model has been run again from rest by the new mode.
         """
-        carry_over(self._shaper, shaper, demand)
+        carry_over(self.shaper, shaper, demand)
         if again and hasattr(shaper, "swing_again"):
             shaper.swing_again()
-        self._shaper = shaper
+        self.shaper = shaper
         self._joins = True

@@ -65,21 +65,21 @@ class TwoAxisMotion:
     """
 
     __slots__ = (
-        "_near_far",
-        "_path_m",
         "_radius_m",
-        "_slew",
         "_tip_m",
         "_weight",
         "height_m",
         "luffing",
+        "near_far",
+        "path_m",
+        "slew",
         "unattended",
     )
 
     def __init__(self, slew: MovingAxis, near_far: MovingAxis | None, path_m: float) -> None:
-        self._slew = slew
-        self._near_far = near_far
-        self._path_m = path_m
+        self.slew = slew
+        self.near_far = near_far
+        self.path_m = path_m
         self._radius_m: float | None = None  # of the grapple
         self._tip_m: float | None = None  # radius of the tip, as ``_bend`` follows it
         self._weight = 1.0
@@ -95,7 +95,7 @@ class TwoAxisMotion:
             tip_m: measured radius of the tip, or None where it is not known.
             circle_m: radius of the grapple as a number of the file, instead of ``tip_m``.
         """
-        slew, near_far, luffing = self._slew, self._near_far, self.luffing
+        slew, near_far, luffing = self.slew, self.near_far, self.luffing
         commanded = slew.commanded or (near_far is not None and near_far.commanded)
         able = slew.able and (near_far is None or near_far.able)
         able = able and (luffing is None or luffing.able)
@@ -131,7 +131,7 @@ class TwoAxisMotion:
         if near_far.period_s != slew.period_s:
             turn = slew.path(near_far.period_s)
             _, way_m = self._tip(turn, near_far.period_s, near_far, radius_m)
-        path_m = self._path_m
+        path_m = self.path_m
         near_far.add(path_m if way_m > path_m else max(way_m, -path_m), weight)
 
     def stop(self) -> None:
@@ -141,7 +141,7 @@ class TwoAxisMotion:
 
     def _rest(self, *, over: bool = False) -> None:
         self._radius_m = None
-        for axis in (self._slew, self._near_far):
+        for axis in (self.slew, self.near_far):
             if axis is not None:
                 axis.added = axis.reached = axis.damped = 0.0
                 axis.damps = False
@@ -158,7 +158,7 @@ class TwoAxisMotion:
             luffing.joins = luffing.commanded
             return
         lead, _, speed, _ = luffing.path(luffing.period_s)
-        stiffness, near_far = luffing.stiffness, self._near_far
+        stiffness, near_far = luffing.stiffness, self.near_far
         target = radius_m / self.height_m * (speed * speed / stiffness - 0.5 * lead * lead)
         if near_far is not None and near_far.commanded:
             out, _, out_rate, _ = near_far.path(luffing.period_s)
@@ -184,7 +184,7 @@ class TwoAxisMotion:
         near_far.way += near_far.sent * passed
         near_far.damps = (
             self._weight == 1.0
-            and abs(near_far.damped) < self._path_m
+            and abs(near_far.damped) < self.path_m
             and near_far.largest <= near_far.room(math.copysign(1.0, near_far.way))
         )
 
@@ -221,7 +221,7 @@ class TwoAxisMotion:
             luffed_m, _, luffed_m_s, luffed_m_s2 = self._luffed(self.luffing, after_s)
             out, out_rate = out + luffed_m, out_rate + luffed_m_s
             out_acceleration += luffed_m_s2
-        slew = self._slew
+        slew = self.slew
         across_2, along_2 = slew.stiffness, near_far.stiffness
         radius_m += after_s * out_rate
         if not radius_m > _LEAST_RADIUS_M:

@@ -24,7 +24,7 @@ def test_the_event_keeps_the_error(changed_rig: Make, missed: int) -> None:
     controller = rig.controller
     assert controller.axes["near_far"].added != 0.0
     controller.events.clear()
-    controller.axes["slew"].axis._transfer._shaper = Faulty()
+    controller.axes["slew"].axis.transfer.shaper = Faulty()
     rig.receive(rig.joystick(Slew=1000))
     rig.tick(missed)
     (event,) = [e for e in controller.events if isinstance(e, StateEvent) and e.axis == "slew"]

@@ -213,4 +213,4 @@ def test_a_limit_aware_filter_is_made_for_the_rate_of_the_valve(
     (shaper,) = bench.axis.retuned
     assert isinstance(shaper, LimitAware)
     pole = -1.3 * MODE.omega_rad_s**0.5
-    assert shaper._gff.poles_rad_s == pytest.approx((pole, pole))
+    assert shaper.gff.poles_rad_s == pytest.approx((pole, pole))

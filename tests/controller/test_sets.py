@@ -24,7 +24,7 @@ def period_s(rig: Rig) -> float:
 
 
 def poles(rig: Rig) -> tuple[float, float]:
-    shaper = rig.controller.axes["slew"].axis._transfer._shaper
+    shaper = rig.controller.axes["slew"].axis.transfer.shaper
     assert isinstance(shaper, Gff)
     return shaper.poles_rad_s
 

@@ -1,18 +1,17 @@
 """Keys for which C has no part are refused by name; numbers are exact to the last bit."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from pydantic import BaseModel
 
 from canshaper import Fir
-from canshaper.config.crane import Motion, Radius
-from canshaper.config.limits import Limits, Sway
-from canshaper.config.schema import AxisSection, Bus, Command, DeploymentConfig, Joystick, Valve
+from canshaper.config.limits import Limits
 from canshaper.errors import ConfigError
+from canshaper.machine.deployment import Deployment
 from canshaper.native.library import sizes_source, tables_source
-from canshaper.native.tables import NOT_EXPORTED, tables
+from canshaper.native.tables import tables
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Shaper, ShaperKind
 from canshaper.shaping.shapers.limit_aware import LimitAware
@@ -22,46 +21,29 @@ from tests.rigs.files import CONFIG, Machine, read
 REFUSED = sorted(
     path.name for path in CONFIG.glob("*.yaml") if path.stem not in SHIPPED and path.is_file()
 )
-# Keys that the tables have, by the pattern of their section; or that no valve frame hangs on.
-_READ = {"bus", "message", "timeout_ms", "alive_counter", "alive_max_step", "qualify", "cycle_ms"}
-_ABOUT = {"codes", "signal", "full", "zero", "invert"}  # what the bound signal has
-_BUS = {"interface", "channel", "bitrate", "fd", "data_bitrate", "options", "match"}
-_BUS |= {"unconfirmed", "network"}
-_SWAY = {"full_speed_m_s", "length_m", "damping_nms", "mass_kg", "period_s", "damping_ratio"}
-_SWAY |= {"decay_per_swing", "origin"}
-_LIMITS = {"max_pct", "min_pct", "rise_per_s", "fall_per_s", "deadband_pct", "curve_command_pct"}
-_LIMITS |= {"curve_speed_pct", "curve_origin", "tail_s", "stop_s", "stop_distance_m"}
-_LIMITS |= {"allow_faster", "allow_reverse", "reversal", "reversal_s"}
-HANDLED: dict[Any, tuple[type[BaseModel], set[str]]] = {
-    (): (
-        DeploymentConfig,
-        {"version", "tick_ms", "tick", "buses", "dbc", "joysticks", "axes", "motion", "status"}
-        | {"identity", "control", "assumed", "crane", "still_deg", "uncertainty", "accept"},
-    ),
-    ("buses", "*"): (Bus, _BUS),
-    ("joysticks", "*"): (Joystick, {*_READ, "enable", "reset", "anti_sway_off", "stuck_s"}),
-    ("axes", "*"): (
-        AxisSection,
-        {"command", "valve", "feedback", "status", "sway", "slewing", "filter", "limits"},
-    ),
-    ("axes", "*", "command"): (Command, {*_ABOUT, "joystick", "neutral_pct"}),
-    ("axes", "*", "valve"): (Valve, {*_READ, *_ABOUT} - {"codes", "alive_max_step", "qualify"}),
-    ("axes", "*", "sway"): (Sway, _SWAY),
-    ("axes", "*", "limits"): (Limits, _LIMITS),
-    ("motion", "*", "radius"): (Radius, {*_READ, "signal", "codes"}),
-}
 
 
-@pytest.mark.parametrize("pattern", HANDLED)
-def test_every_key_of_the_file_is_in_the_tables_or_refused(pattern: Any) -> None:
-    """A new key of these sections fails here until someone has decided."""
-    model, handled = HANDLED[pattern]
-    assert set(model.model_fields) == handled | set(NOT_EXPORTED.get(pattern, ()))
+class NewLimits(Limits):
+    """Limits with a key that nobody has built into the C."""
+
+    new: float = 1.0
 
 
-def test_a_motion_has_no_other_key() -> None:
-    known = {"slew", "near_far", "radius", "radius_m", "max_pct", "max_path_m", "max_s", "aim"}
-    assert set(Motion.model_fields) == known | {"luffing", "luffing_rad_s", "waits"}
+def test_a_key_that_the_c_does_not_follow_is_refused_unless_it_has_its_default(
+    machine: Machine,
+) -> None:
+    deployment = machine.load()
+    axis = deployment.config.axes["slew"]
+
+    def with_new(value: float) -> Deployment:
+        limits = NewLimits.model_construct(**dict(axis.limits), new=value)
+        changed = {"slew": axis.model_copy(update={"limits": limits})}
+        config = deployment.config.model_copy(update={"axes": deployment.config.axes | changed})
+        return replace(deployment, config=config)
+
+    tables(with_new(1.0))
+    with pytest.raises(ConfigError, match=r"axes\.slew\.limits\.new: expected none in an export"):
+        tables(with_new(2.0))
 
 
 def problems(machine: Machine) -> list[str]:

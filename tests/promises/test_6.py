@@ -52,7 +52,7 @@ def raising(world: World) -> None:
             raise ZeroDivisionError
 
     for control in world.evil.axes.values():
-        control.axis._transfer._shaper = Raising()
+        control.axis.transfer.shaper = Raising()
 
 
 FAULTS = {

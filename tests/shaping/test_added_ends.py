@@ -45,7 +45,7 @@ def test_what_was_added_beyond_the_own_part_stops_before_the_own_part_begins(sig
         run(axis, ticks, sign * command)
     run(axis, 20, 0.0, -sign)
     assert sign * axis.output.setpoint < -0.5
-    assert sign * axis._stage._own_ramp > 0.1
+    assert sign * axis.stage._own_ramp > 0.1
     axis.drop_added()
     seen = []
     for _ in range(3):
@@ -62,7 +62,7 @@ def test_what_was_added_to_an_own_part_that_turns_ends_before_the_other_side(sig
     for command, ticks in ((-1.0, 1), (-0.4, 10), (1.0, 11)):
         run(axis, ticks, sign * command)
     run(axis, 27, 0.0, -sign * 0.1)
-    assert sign * axis._stage._own_ramp == pytest.approx(-0.04)
+    assert sign * axis.stage._own_ramp == pytest.approx(-0.04)
     assert sign * axis.output.setpoint == pytest.approx(-0.14, abs=SLACK)
     axis.drop_added()
     axis.tick(CommandInput())
@@ -127,7 +127,7 @@ def test_what_falls_is_rounded_to_the_side_of_rest(sign: float) -> None:
     run(axis, 10, 0.0, sign * 0.2)
     for _ in range(40):
         axis.tick(CommandInput())
-        assert 0.0 <= sign * axis.output.setpoint <= sign * axis._stage.ramp + 1e-12
+        assert 0.0 <= sign * axis.output.setpoint <= sign * axis.stage.ramp + 1e-12
 
 
 def test_with_anti_sway_off_nothing_that_is_added_begins_a_motion() -> None:

@@ -140,7 +140,7 @@ def test_of_a_long_standstill_not_every_tick_is_gone_through(drive: Drive) -> No
             self.times += 1
             return 0.0
 
-    drive.axis._transfer._shaper = counted = Counted()
+    drive.axis.transfer.shaper = counted = Counted()
     drive.axis.hold(50 * 86_400)
     assert counted.times <= 2000
 
@@ -155,7 +155,7 @@ def test_in_missed_ticks_the_filter_sees_the_last_command(drive_with: DriveWith)
 
     drive = drive_with(limits=OutputLimits(maximum=0.5))
     drive.moving()
-    drive.axis._transfer._shaper = Seen()
+    drive.axis.transfer.shaper = Seen()
     for joystick in (0.3, -0.8):
         drive.tick(CommandInput(joystick))
         drive.axis.hold(2)

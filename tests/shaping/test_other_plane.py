@@ -157,7 +157,7 @@ def test_a_filter_that_gives_no_number_while_the_axis_damps_is_named() -> None:
     rig = swinging(Rig())
     rig.run(0.1, damps=True)
     assert rig.axis.output.damping
-    rig.axis._transfer._shaper = Mock(step=Mock(return_value=math.nan))
+    rig.axis.transfer.shaper = Mock(step=Mock(return_value=math.nan))
     tripped = rig.axis.command(CommandInput(enabled=True), 0.0, damps=True)
     assert tripped is not None
     assert tripped.error.startswith("ValueError: filter output is nan (")

@@ -118,7 +118,7 @@ def test_a_rest_forgets_what_was_commanded() -> None:
 def test_missed_ticks_make_an_axis_unattended_as_others_do() -> None:
     axis = ShapedAxis(TICK_S, LIMITS, sway=None, shaper=Off(), stop_s=5.0)
     axis.tick(CommandInput())
-    axis.added_time._rested = axis._stage.tail + UNATTENDED_TICKS - 3
+    axis.added_time._rested = axis.stage.tail + UNATTENDED_TICKS - 3
     axis.hold(3)
     assert not axis.added_time.unattended
     axis.hold(1)

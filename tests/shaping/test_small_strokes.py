@@ -284,7 +284,7 @@ def test_missed_ticks_count_and_a_retune_and_a_stop_lose_the_travel() -> None:
     axis = axis_with()
     for _ in range(20):
         axis.tick(CommandInput(0.3))
-    axis._stage._small = small = Mock(wraps=axis._stage._small)
+    axis.stage.small = small = Mock(wraps=axis.stage.small)
     axis.hold(5)
     small.hold.assert_called_once_with(axis.demand, axis.output.applied, 5)
     axis.tick(CommandInput(0.3))

@@ -29,7 +29,7 @@ class Gff:
         ValueError: a pole is not negative or too fast for the tick.
     """
 
-    __slots__ = ("_command", "_share", "_sway", "_third", "k1", "k2", "poles_rad_s")
+    __slots__ = ("_command", "_sway", "_third", "k1", "k2", "poles_rad_s", "share")
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class Gff:
         """
         sway, third = self._sway, self._third
         # The lag reaches exp(p T) in the tick of the step; a share of 1 is no lag.
-        self._share = 1.0 if third is None else -math.expm1(third / factor * sway.tick_s)
+        self.share = 1.0 if third is None else -math.expm1(third / factor * sway.tick_s)
         d1, d2 = (math.expm1(p / factor * sway.tick_s) for p in self.poles_rad_s)
         # In increments d = z - 1 the closed loop F - F (0,1) K has trace d1 + d2, determinant
         # d1 d2; det(F) is the product of the sway poles' own increments.
@@ -85,7 +85,7 @@ class Gff:
     def step(self, command: float) -> float:
         """Return the output that the filter asks for, before limits; ``command`` in [-1, 1]."""
         sway = self._sway
-        self._command += self._share * (command - self._command)
+        self._command += self.share * (command - self._command)
         command = self._command
         angle, rate = sway.angle + sway.free_angle, sway.rate + sway.free_rate
         return command - self.k1 * angle - self.k2 * (rate + command)

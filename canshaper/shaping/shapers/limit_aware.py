@@ -42,7 +42,7 @@ class LimitAware:
     """
 
     spreads = True
-    __slots__ = ("_gff", "_pole", "_rate", "_shaper", "_sway", "_table", "_twin", "_unlimited")
+    __slots__ = ("_pole", "_rate", "_sway", "_table", "_twin", "_unlimited", "gff", "shaper")
 
     def __init__(self, sway: SwayModel, shaper: Fir, rate_per_s: float = math.inf) -> None:
         omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
@@ -53,13 +53,13 @@ class LimitAware:
             )
         self._rate = rate_per_s
         self._pole = pole = self._pole_rad_s(omega)
-        self._gff = Gff(sway, (pole, pole))
+        self.gff = Gff(sway, (pole, pole))
         self._table: (
             tuple[float, float, list[tuple[list[float], list[float], list[float]]]] | None
         ) = None
         self._sway = sway
         self._twin = SwayModel(sway.mode, sway.tick_s)
-        self._shaper = shaper
+        self.shaper = shaper
         self._unlimited = 0.0
 
     def _pole_rad_s(self, omega: float) -> float:
@@ -70,7 +70,7 @@ class LimitAware:
 
         For each of them compute also the twin's response to a command of one tick.
         """
-        taps, period_s = self._shaper.taps, self._sway.mode.period_s
+        taps, period_s = self.shaper.taps, self._sway.mode.period_s
         longest = len(stretched(taps, most))
         rows = []
         for i in range(TABLE_STEPS + 1):
@@ -86,7 +86,7 @@ class LimitAware:
                 twin.step(tap)
             rows.append((row, angles, rates))
         self._table = least, (most - least) / TABLE_STEPS, rows
-        self._shaper.lengthen(longest)
+        self.shaper.lengthen(longest)
 
     def follow(self, factor: float) -> None:
         """Adapt to the present sway model: stretch the taps in time by the factor.
@@ -98,7 +98,7 @@ class LimitAware:
         least, step, rows = self._table
         at = min(max((factor - least) / step, 0.0), TABLE_STEPS - 1e-9)
         low, high, share = rows[int(at)], rows[int(at) + 1], at % 1.0
-        shaper, twin, mode = self._shaper, self._twin, self._sway.mode
+        shaper, twin, mode = self.shaper, self._twin, self._sway.mode
         shaper.taps = [a + share * (b - a) for a, b in zip(low[0], high[0], strict=True)]
         twin.follow(mode)
         if self._sway.angle != 0.0 or self._sway.rate != 0.0:
@@ -106,17 +106,17 @@ class LimitAware:
             self._unlimited, twin.angle, twin.rate = (
                 a + share * (b - a) for a, b in zip(now, then, strict=True)
             )
-        self._gff.follow(self._pole / self._pole_rad_s(mode.omega_rad_s))
+        self.gff.follow(self._pole / self._pole_rad_s(mode.omega_rad_s))
 
     def copy_state(self, old: "LimitAware") -> None:
         """Copy the state of another filter of this class."""
         self._twin = old._twin.retuned(self._sway.mode, old._unlimited)
         self._unlimited = old._unlimited
-        self._shaper.copy_state(old._shaper)
+        self.shaper.copy_state(old.shaper)
 
     def swing_again(self) -> None:
         """Give the twin the swing that it would have had with these taps from the start."""
-        shaper, twin = self._shaper, SwayModel(self._sway.mode, self._sway.tick_s)
+        shaper, twin = self.shaper, SwayModel(self._sway.mode, self._sway.tick_s)
         angles, rates = [], []
         for tap in shaper.taps:
             angles.append(twin.angle)
@@ -129,7 +129,7 @@ class LimitAware:
         """Set the memory as if the command had been constant for long, without swing by limits."""
         self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate
         self._unlimited = command
-        self._shaper.reset_to_steady_state(command)
+        self.shaper.reset_to_steady_state(command)
 
     def step(self, command: float) -> float:
         """Return the output for this tick's command, before limits."""
@@ -137,11 +137,11 @@ class LimitAware:
         twin.step(self._unlimited)
         if sway.angle == 0.0 == sway.rate:  # never moved, or started again after a fault
             twin.angle = twin.rate = 0.0
-        self._unlimited = unlimited = self._shaper.step(command)
+        self._unlimited = unlimited = self.shaper.step(command)
         return (
             unlimited
-            - self._gff.k1 * (sway.angle + sway.free_angle - twin.angle)
-            - self._gff.k2 * (sway.rate + sway.free_rate - twin.rate)
+            - self.gff.k1 * (sway.angle + sway.free_angle - twin.angle)
+            - self.gff.k2 * (sway.rate + sway.free_rate - twin.rate)
         )
 
 

@@ -13,15 +13,15 @@ class FirstOrder:
         time_constant_s: time to 63 % of a step.
     """
 
-    __slots__ = ("_share", "_value")
+    __slots__ = ("_value", "share")
 
     def __init__(self, tick_s: float, time_constant_s: float) -> None:
-        self._share = -math.expm1(-tick_s / time_constant_s)
+        self.share = -math.expm1(-tick_s / time_constant_s)
         self._value = 0.0
 
     def step(self, command: float) -> float:
         """Return the output for this tick's command."""
-        self._value += self._share * (command - self._value)
+        self._value += self.share * (command - self._value)
         return self._value
 
     def reset_to_steady_state(self, command: float) -> None:
@@ -42,26 +42,26 @@ class SCurve:
         jerk_per_s2: fastest change of that rate, full speeds per second squared.
     """
 
-    __slots__ = ("_jerk", "_rate", "_slope", "_tick_s", "_value")
+    __slots__ = ("_slope", "_value", "jerk", "rate", "tick_s")
 
     def __init__(self, tick_s: float, rate_per_s: float, jerk_per_s2: float) -> None:
-        self._tick_s = tick_s
-        self._rate = rate_per_s
-        self._jerk = jerk_per_s2
+        self.tick_s = tick_s
+        self.rate = rate_per_s
+        self.jerk = jerk_per_s2
         self._value = 0.0
         self._slope = 0.0
 
     def step(self, command: float) -> float:
         """Return the output for this tick's command."""
         left = command - self._value
-        change = self._jerk * self._tick_s
+        change = self.jerk * self.tick_s
         # Fastest slope from which the command can still be met with this jerk in whole ticks:
         # s T + (s - j T) T + ... <= |left|
-        steps = abs(left) / (change * self._tick_s)
+        steps = abs(left) / (change * self.tick_s)
         reachable = change * 0.5 * (math.sqrt(1.0 + 8.0 * steps) - 1.0)
-        reference = math.copysign(min(self._rate, reachable), left)
+        reference = math.copysign(min(self.rate, reachable), left)
         self._slope += min(max(reference - self._slope, -change), change)
-        step = self._slope * self._tick_s
+        step = self._slope * self.tick_s
         if step * left > 0.0 and abs(step) >= abs(left) and abs(self._slope) <= change:
             step, self._slope = left, 0.0  # arrived
         self._value += step
