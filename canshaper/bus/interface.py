@@ -151,7 +151,7 @@ class Interface:
         self._not_before_ns = 0
 
     def _reopened(self) -> bool:
-        """Open the sockets again when it is time; return whether they are open."""
+        """Try to open lost sockets again, every ``REOPEN_NS``; return whether this opened them."""
         if self.state not in AWAY or time.monotonic_ns() < self._not_before_ns:
             return False
         try:

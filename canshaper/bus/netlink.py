@@ -29,7 +29,7 @@ def attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
     at = 0
     while at + _ATTRIBUTE.size <= len(data):
         length, kind = _ATTRIBUTE.unpack_from(data, at)
-        if length < _ATTRIBUTE.size:
+        if not _ATTRIBUTE.size <= length <= len(data) - at:
             return
         yield kind & TYPE_MASK, data[at + _ATTRIBUTE.size : at + length]
         at += -(-length // 4) * 4

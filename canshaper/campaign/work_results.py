@@ -37,10 +37,15 @@ Doing = Callable[[Sequence[Work]], Done]
 
 
 class Task(NamedTuple):
-    """A tolerance, and the operator who works to it."""
+    """A tolerance, and the operator who works to it.
+
+    Attributes:
+        operator: name of the model of the operator.
+        within: distance of the tip from its target, m, and swing, degrees; infinite: any.
+    """
 
     operator: str
-    within: tuple[float, float]  # tip, m, and swing, degrees; infinite: any
+    within: tuple[float, float]
 
     @property
     def head(self) -> str:

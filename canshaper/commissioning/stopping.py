@@ -68,7 +68,7 @@ class Travel:
 
     @classmethod
     def worst(cls, travels: "list[Travel]") -> Self:
-        """Return the longest travel after each event."""
+        """Return, for each event, the longest of these travels."""
         return cls(*(max(getattr(t, f.name) for t in travels) for f in fields(cls)))
 
 

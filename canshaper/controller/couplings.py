@@ -122,7 +122,7 @@ class MotionControl:
             moving.fall_per_s = control.bound.config.limits.fall_per_s
 
     def step(self, now_ns: int, last: int, now: int) -> MotionEvent | None:
-        """Set the velocity that each axis adds in this tick.
+        """Find what each axis adds to its own output in this tick, and store it in its control.
 
         Args:
             now_ns: monotonic time.
@@ -130,7 +130,7 @@ class MotionControl:
             now: number of this deadline.
 
         Returns:
-            The event, if the axes now move as one or no longer do; else None.
+            The event, if the axes have just begun or ceased to move as one; else None.
         """
         apart = ""
         tick_s, members = self.tick_s, self._members

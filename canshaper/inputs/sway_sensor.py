@@ -32,7 +32,7 @@ class SwaySensorInput(Input):
         self.values: dict[str, float | None] = {}
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take the values of all signals; a code that is no value is a fault."""
+        """Take the values of an accepted frame; in any frame a code that is no value is a fault."""
         values = {one.name: self._value(one, raw) for one in self._signals}
         if accepted:
             self.number += 1

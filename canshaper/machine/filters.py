@@ -80,7 +80,10 @@ def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, S
 
 
 def at_ends(place: Place, axis: AxisSection) -> Iterator[tuple[Place, Filter, Sway | None]]:
-    """Yield (place, filter, sway data) at the shortest and the longest rope of the axis."""
+    """Yield (place, filter, sway data) at the shortest and the longest rope of the axis.
+
+    Yield nothing for a filter that does not follow the rope.
+    """
     sway, chosen = axis.sway, axis.filter
     follows = KINDS[chosen.kind].follows
     if sway is None or sway.length is None or follows is None:
@@ -117,7 +120,7 @@ def check_rope(lookup: Lookup, place: Place, axis: AxisSection) -> None:
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Yield (place, reason) of filters designed for another swing or valve than the file has."""
+    """Yield (place, reason) of filters that do not suit swing, valve or reversal of the file."""
     for name, axis in config.axes.items():
         for place, chosen, sway in every_filter(("axes", name), axis):
             design = chosen.design()

@@ -65,7 +65,12 @@ class Evidence:
         self._energies = 0.0, 0.0, 0.0, 0.0
 
     def add(self, errors: Errors) -> None:
-        """Take a measurement by its errors under the hypotheses, see ``SwayObserver.errors``."""
+        """Add a measurement.
+
+        Args:
+            errors: errors if this axis moved it as modelled, with the other sign, not at all, and
+                if the grapple was dragged (``SwayObserver.errors``).
+        """
         fade = self._fade
         known, negated, alone, dragged = self._energies
         known += fade * (errors[0] * errors[0] - known)

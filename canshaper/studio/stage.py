@@ -172,7 +172,7 @@ class Stage:
                 action(self.cab, time.monotonic())
 
     def other(self, page: int, message: Mapping[str, Any]) -> bool:
-        """Take a message that only pages of some stages send; return whether it was one."""
+        """Handle a message that only the page of a subclass sends; return whether it was one."""
         return False
 
     def slide(self, name: str, factor: float) -> None:

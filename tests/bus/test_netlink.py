@@ -44,6 +44,8 @@ def test_an_attribute_that_is_cut_short_ends_them() -> None:
     good = attribute(1, b"a")
     assert list(attributes(good + b"\x03\0\x02\0" + good)) == [(1, b"a")]
     assert list(attributes(good + b"\x08\0")) == [(1, b"a")]
+    assert list(attributes(good + b"\x09\0\x02\0abcd")) == [(1, b"a")]  # a byte too few
+    assert list(attributes(good + b"\x08\0\x02\0abcd")) == [(1, b"a"), (2, b"abcd")]
 
 
 def answer(kind: int, body: bytes) -> bytes:

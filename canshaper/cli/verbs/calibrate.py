@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -23,7 +23,9 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
+    from canshaper.machine.deployment import Deployment
 
 GROUP = "setup"
 
@@ -85,7 +87,6 @@ def calibrate(
     """
     from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.commissioning.calibration.fit import curve_lines, write_curve
     from canshaper.commissioning.calibration.pump import pair_of, pump_lines
     from canshaper.commissioning.calibration.ramp import (
         RATE_PER_S,
@@ -95,7 +96,7 @@ def calibrate(
         usual_top,
     )
     from canshaper.commissioning.calibration.run import run_live, run_simulated
-    from canshaper.commissioning.origins import origin_of, written_line
+    from canshaper.commissioning.origins import origin_of
     from canshaper.report.console import progress_bar
     from canshaper_sim.parameters import changed_parameters
 
@@ -134,22 +135,36 @@ def calibrate(
         lines = pump_lines(deployment, axes, [drive.moments], origin if write else None)
         results.conclude(lambda to: to.print("\n".join(lines), soft_wrap=True))
         return
-    result, top_pct = drive.result(), 100.0 * ramp.top
-    lines = curve_lines(deployment, axes[0], result, top_pct)
+    _conclude(results, deployment, drive, origin if write else None)
+
+
+def _conclude(
+    results: "Results",
+    deployment: "Deployment",
+    drive: "CalibrationDrive",
+    origin: dict[str, Any] | None,
+) -> None:
+    """Show the curve of one valve; write it into the file with its origin, if there is one."""
+    from canshaper.commissioning.calibration.fit import curve_lines, write_curve
+    from canshaper.commissioning.origins import written_line
+
+    axis, result, top_pct = drive.axis, drive.result(), 100.0 * drive.ramp.top
+    lines = curve_lines(deployment, axis, result, top_pct)
 
     def figure() -> "Figure":
         from canshaper.commissioning.plots import of_valve
 
-        return of_valve(axes[0], limits[0].output_limits(), result, top_pct)
+        limits = deployment.axes[axis].config.limits.output_limits()
+        return of_valve(axis, limits, result, top_pct)
 
     def finish() -> list[str]:
-        write_curve(deployment, axes[0], result, origin)
+        if origin is None:
+            return []
+        write_curve(deployment, axis, result, origin)
         return [written_line(deployment.path)]
 
     results.conclude(
-        lambda to: to.print("\n".join(lines), soft_wrap=True),
-        figure=figure,
-        finish=finish if write else list,
+        lambda to: to.print("\n".join(lines), soft_wrap=True), figure=figure, finish=finish
     )
 
 

@@ -113,7 +113,14 @@ def _words(interface: str | None, channels: list[str] | None, *, network: bool) 
 
 
 def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: bool) -> "Bench":
-    """Return the bench: the machine, or the simulated crane with which the rehearsal began."""
+    """Return the bench: the machine, or a simulated crane.
+
+    Args:
+        files: files of the procedure.
+        words: how to reach the daemon of the machine.
+        changes: how the simulated crane differs; empty: as when the rehearsal began.
+        simulated: whether this is a rehearsal.
+    """
     from canshaper.commissioning.procedure.bench import Simulated
     from canshaper.commissioning.procedure.machine import Machine
     from canshaper.commissioning.procedure.state import read_state

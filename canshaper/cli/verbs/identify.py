@@ -108,22 +108,15 @@ def identify(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.log_folders import check_only_folders, identified, run_fleet, show_periods
     from canshaper.cli.results import Results
-    from canshaper.commissioning.calibration.pump import drives_in, pair_of, pump_lines
     from canshaper.commissioning.identification.canlog import messages_of
     from canshaper.commissioning.identification.data import (
         axis_named,
         logged,
         measured_in,
-        paths_of,
         signals_named,
         timed_by_hand,
     )
-    from canshaper.commissioning.identification.report import (
-        advice_on,
-        as_dict,
-        headlines,
-        write_sway,
-    )
+    from canshaper.commissioning.identification.report import advice_on
     from canshaper.report.console import progress_bar
 
     deployment = loader(file)() if file else None
@@ -142,11 +135,7 @@ def identify(
     if together:
         if deployment is None or as_json or picture:
             raise UsageError("--together: expected --file, and neither --json nor --picture")
-        speeds = signals_named(signal or [], deployment)
-        axes = pair_of(deployment, [*speeds])
-        drives = drives_in(deployment, paths_of(logs or []), axes, speeds, channel)
-        origin = measured_in(logs or [], deployment.messages)
-        pump = pump_lines(deployment, axes, drives, origin if write else None)
+        pump = _pump(deployment, logs or [], signal or [], channel, write)
         results.conclude(lambda to: to.print("\n".join(pump)))
         return
     with os_errors(out):
@@ -159,32 +148,64 @@ def identify(
                 messages = messages_of(dbc or [], deployment)
                 findings = logged(logs or [], *named, messages, **options, on_progress=on_progress)
         advice = advice_on(findings, deployment)
+        origin = measured_in(logs or [], messages_of(dbc or [], deployment)) if write else None
+    _conclude(results, findings, advice, deployment, origin, out / "identify.png", as_json)
+
+
+def _conclude(
+    results: "Results",
+    findings: list["SwingFinding"],
+    advice: list["Advice"],
+    deployment: "Deployment | None",
+    origin: dict[str, Any] | None,
+    path: Path,
+    as_json: bool,
+) -> None:
+    """Show what the logs showed; write it into the file with its origin, if there is one."""
+    from canshaper.commissioning.identification.report import as_dict, headlines, write_sway
+
     seen = [one for one in findings if one.free or one.driven]
+    written: list[str] = []
 
     def figure() -> "Figure":
         from canshaper.commissioning.identification.plot import figure as of_swings
 
         return of_swings(seen, headlines(findings, advice))
 
-    written: list[str] = []
-
     def finish() -> list[str]:
-        if write and deployment:
-            origin = measured_in(logs or [], messages_of(dbc or [], deployment))
+        if origin and deployment:
             written.extend(write_sway(deployment, findings, advice, origin))
         return _next_steps(advice, deployment, written) if deployment else []
 
-    def data(path: Path | None) -> dict[str, Any]:
-        return as_dict(findings, advice) | {"picture": path, "written": written}
+    def data(picture: Path | None) -> dict[str, Any]:
+        return as_dict(findings, advice) | {"picture": picture, "written": written}
 
     results.conclude(
         partial(_print, findings, advice),
         figure=figure if seen else None,
-        path=out / "identify.png",
+        path=path,
         data=data if as_json else None,
         finish=finish,
         code=0 if all(one.usable for one in findings) else EXIT_NOT_ENOUGH_DATA,
     )
+
+
+def _pump(
+    deployment: "Deployment",
+    logs: list[str],
+    signals: list[str],
+    channel: str | None,
+    write: bool,
+) -> list[str]:
+    """Return the flow of the pump as lines, from logs of two axes; write it into the file too."""
+    from canshaper.commissioning.calibration.pump import drives_in, pair_of, pump_lines
+    from canshaper.commissioning.identification.data import measured_in, paths_of, signals_named
+
+    speeds = signals_named(signals, deployment)
+    axes = pair_of(deployment, [*speeds])
+    drives = drives_in(deployment, paths_of(logs), axes, speeds, channel)
+    origin = measured_in(logs, deployment.messages)
+    return pump_lines(deployment, axes, drives, origin if write else None)
 
 
 def _print(

@@ -140,6 +140,12 @@ def _joystick_ns(
 ) -> list[int]:
     """Return the times from each joystick frame to the valve frames that are computed with it.
 
+    Args:
+        deployment: the machine.
+        received: frames that the loop had taken from each bus by each tick, one tick after another.
+        sent: (tick, number of the axis, time in ns) of each valve frame.
+        hand: (number of the joystick, time in ns) of each joystick frame, by bus.
+
     A bus keeps the order of its frames: the n-th one that a joystick sent on it is the n-th that
     the loop took. Frames from before the first tick are too old, those after the last valve frame
     have no answer.

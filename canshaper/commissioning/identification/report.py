@@ -83,7 +83,12 @@ def _advise(axis: str, findings: Sequence[SwingFinding], deployment: Deployment 
 
 
 def _values(finding: SwingFinding, speed_m_s: float | None) -> SwayNumbers:
-    """Return the sway values of a finding as they are written."""
+    """Return period, damping ratio (clamped) and full speed of a finding, rounded for the file.
+
+    Args:
+        finding: what a log showed.
+        speed_m_s: full speed where the log showed none; None leaves it out.
+    """
     assert finding.period_s and finding.damping_ratio
     values = {
         "period_s": round(finding.period_s.value, 4),

@@ -55,7 +55,10 @@ def listen(context: Context) -> Outcome:
 
 
 def _rows(traffic: Traffic, deployment: Deployment) -> list[tuple[str, list[float]]]:
-    """Return times of messages by bus and name; by identifier where the DBC files lack them."""
+    """Return (bus and message name, arrival times in s of its frames) of each message, sorted.
+
+    A message that the DBC files lack has its identifier in place of a name.
+    """
     rows = []
     for (bus, can_id, extended), times in traffic.frames.items():
         names = deployment.messages.named([(can_id, extended)])

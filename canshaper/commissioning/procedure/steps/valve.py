@@ -69,7 +69,10 @@ def calibrate_valves(context: Context) -> Outcome:
 
 
 def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
-    """Return MESSAGE.SIGNAL of the speed of an axis; ``NONE`` where there is none."""
+    """Ask for MESSAGE.SIGNAL of the measured speed of an axis; ``NONE`` for none.
+
+    The feedback of the file or the usual signal is proposed; a rehearsal takes it without asking.
+    """
     default = SPEED_SIGNALS.get(deployment.coordinates.get(name, name), NONE)
     if isinstance(deployment.messages.find(default.partition(".")[0]), str):
         default = NONE
