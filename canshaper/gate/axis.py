@@ -67,8 +67,8 @@ class AxisState(AxisInput):
 
     __slots__ = (
         "alone", "armed", "asked", "asked_now", "back", "cause", "due", "flips", "forth", "held",
-        "joystick", "last", "latched", "least", "most", "now", "partner", "ramp", "ran", "sent_at",
-        "stop_left", "ticks", "top", "way", "way_back", "why", "zero_at",
+        "high", "joystick", "last", "latched", "least", "most", "now", "partner", "ramp", "ran",
+        "sent_at", "stop_left", "ticks", "top", "way", "way_back", "why", "zero_at",
     )  # fmt: skip
 
     def __init__(self, axis: Axis, joystick: JoystickState) -> None:
@@ -94,7 +94,8 @@ class AxisState(AxisInput):
         # ``last``: velocity of the last frame. ``top``: what it may have been before rounding, or
         # may be by now where no frame was passed on. ``way_back``: a fall at ``fall_per_s`` from
         # the last demand; that is no run-on, and a velocity no faster counts no distance.
-        self.last, self.top, self.way_back = 0.0, axis.step, axis.step
+        # ``high``: ``top`` by the rise of all frames since it was at rest.
+        self.last, self.top, self.high, self.way_back = 0.0, axis.step, axis.step, axis.step
         self.zero_at = NEVER  # ``made`` when it came to rest, or lost the right to move
         self.ran = 0.0  # distance in one run beyond the demand and what a partner may add
         # Distance and periods in motion since the axis last had a demand, or its partner had none;
@@ -125,7 +126,7 @@ class AxisState(AxisInput):
         self.now = 0.0
         self.ticks += 1
         if self.last and number - self.sent_at > of.silent:  # its valve has closed by itself
-            self.last, self.top, self.zero_at = 0.0, of.step, made
+            self.last, self.top, self.high, self.zero_at = 0.0, of.step, of.step, made
         left = self.stop_left - passed if self.stop_left > passed else 0
         if why:
             self.halt(why, made, latch=latches or self.last != 0.0)
@@ -187,6 +188,15 @@ class AxisState(AxisInput):
             reach = self.most if self.last > 0.0 else -self.least
             self.top = max(self.top - self.of.fall, min(self.top, reach))
 
+    def risen(self, velocity: float, periods: int) -> float:
+        """Return the speed, before rounding up, to which the output may rise in so many periods."""
+        of, rise = self.of, self.of.rise * periods
+        if velocity * self.last >= 0.0:
+            return min(self.top, self.high) + rise
+        # A part of the time goes by on the way to zero.
+        left = 1.0 - max(abs(self.last) - of.step, 0.0) / (of.fall * max(periods, 1))
+        return max(left, 0.0) * rise + of.step
+
     def fallen(self, velocity: float, periods: int) -> float:
         """Return the speed to which the output has to fall in so many periods in a direction."""
         return self.top - self.of.fall * periods if velocity * self.last >= 0.0 else 0.0
@@ -203,6 +213,7 @@ class AxisState(AxisInput):
             self._rests(passed, made)
             return
         size, held = abs(velocity), self.held_at(velocity)
+        self.high = self.risen(velocity, passed if of.forwarded else 1)
         asked, other = (self.forth, self.back) if velocity > 0.0 else (self.back, self.forth)
         reach = self.most if velocity > 0.0 else -self.least
         fallen = self.fallen(velocity, min(passed, 1) if of.forwarded else passed)
@@ -235,7 +246,7 @@ class AxisState(AxisInput):
                 self.halt("fell to neutral at once", made, latch=False)
         if self.now:
             self.ran = 0.0
-        self.last, self.top, self.way_back = 0.0, of.step, of.step
+        self.last, self.top, self.high, self.way_back = 0.0, of.step, of.step, of.step
 
     def carry_over(self, before: "AxisState") -> None:
         """Keep the latch over a reload, and any reason to stop that no tick has seen yet."""

@@ -84,14 +84,8 @@ def direction_and_size(axis: AxisState, velocity: float, fallen: float) -> str:
 
 
 def rise(axis: AxisState, velocity: float, ticks: int) -> str:
-    """Rule 5: the output rises no faster than ``rise_per_s`` and rounding, one period a frame."""
-    of, last = axis.of, abs(axis.last)
-    step, most = of.step, of.rise * ticks
-    if velocity * axis.last >= 0.0:
-        highest = axis.top + most + UP * step  # ``top`` includes the rounding down
-    else:  # a part of the time goes by on the way to zero
-        left = 1.0 - max(last - step, 0.0) / (of.fall * max(ticks, 1))
-        highest = max(left, 0.0) * most + ROUNDING * step
+    """Rule 5: the output rises no faster than ``rise_per_s``, one period a frame, and rounding."""
+    highest = axis.risen(velocity, ticks) + UP * axis.of.step
     return "" if abs(velocity) <= highest + EPSILON else f"limit=rise allowed={highest:.3f}"
 
 

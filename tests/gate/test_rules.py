@@ -5,6 +5,7 @@ Full command is 125 steps without a dead band here, a step 0.008 of full speed.
 
 import pytest
 
+from canshaper.gate.rules import rise
 from tests.faults import variants
 from tests.gate.bench import Bench, bench, limited, load, signs
 
@@ -150,6 +151,19 @@ class TestRates:
         why = one.sends(sign * steps, near_far=float(sign))
         # 0.2, a step, the rise, and half a step
         assert ("limit=rise allowed=0.312" in why) is not passes
+
+    @signs
+    @pytest.mark.parametrize("rise_per_s", [0.2, 0.5, 2.0])
+    def test_rounding_does_not_add_up_over_frames(self, sign: int, rise_per_s: float) -> None:
+        one = bench(rise_per_s=rise_per_s)
+        one.rests()
+        axis, steps, ticks = one.axis, 0, 20
+        for _ in range(ticks):  # each frame as fast as the rule allows
+            assert not one.sends(sign * steps, near_far=float(sign))
+            while not rise(axis, axis.of.velocity(sign * (steps + 1)), 1):
+                steps += 1
+        ramp = ticks * rise_per_s * 0.02
+        assert ramp <= steps * axis.of.step <= ramp + 1.5 * axis.of.step
 
     @signs
     def test_missed_deadlines_give_no_more_rise(self, sign: int) -> None:

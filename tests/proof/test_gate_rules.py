@@ -67,6 +67,7 @@ class AnyState:
         of.stick = replace(of.stick, band=real("band"))
         axis.forth, axis.back = Demand("forth"), Demand("back")  # type: ignore[assignment]
         axis.now, axis.last, axis.top, axis.ran = map(real, ("now", "last", "top", "ran"))
+        axis.high = real("high")
         axis.held = integer("held")
         axis.armed, axis.latched = truth("armed"), truth("latched")
         axis.asked, axis.stop_left = truth("asked"), integer("stop_left")
