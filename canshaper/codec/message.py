@@ -174,8 +174,8 @@ class Sender:
         return self.frame()
 
     def copy_state(self, before: Self) -> None:
-        """Continue the count of ``before`` if it has the same counter; else stay at 0."""
-        if (self._counter, self._counts) == (before._counter, before._counts):
+        """Continue the count of ``before`` if its counter has as many values; else stay at 0."""
+        if self._counts == before._counts:
             self._count = before._count
 
 

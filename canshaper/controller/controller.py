@@ -31,6 +31,7 @@ class Controller:
         inputs: receiver of each message that has an exact identifier.
         events: events for the log since the owner last emptied the list.
         motions: the two-axis motions.
+        valves: the valve messages.
         status: the status messages.
         moves: whether the frame that was handed out last is a valve's, and an axis that has run in
             this tick moves.
@@ -74,11 +75,10 @@ class Controller:
         for protocol in self._protocols:
             self.inputs |= protocol.inputs
             self._forwarding |= protocol.forwarding
-        self._valves = ValveMessages(self.axes, deployment.routing.valves, self._forwarding)
+        self.valves = ValveMessages(self.axes, deployment.routing.valves, self._forwarding)
         self._last = -1  # number of the last deadline
         self._overrun = OverrunDetector()
-        self._stood_still = False
-        self.moves = False
+        self._stood_still = self.moves = False
 
     def carry_over(self, before: "Controller") -> None:
         """Continue from the state of the controller that ran before a reload.
@@ -128,7 +128,7 @@ class Controller:
             fault = entry.receive(frame.data, arrived_ns)
         elif key in self._sent:  # a bus never hands back our own frames
             fault = FrameFault.SECOND_SENDER
-            self._valves.foreign_sender(key, arrived_ns)
+            self.valves.foreign_sender(key, arrived_ns)
         elif (handler := self._handler(frame)) is not None:
             fault = handler.receive(frame, arrived_ns)
         elif key[1:] in self._others or any(one.usual(frame) for one in self._protocols):
@@ -186,7 +186,7 @@ class Controller:
         if self._couplings.any:
             self._couplings.step(now_ns, last, now, self.events)
         silent = self.silent_buses if self._protocols else NOWHERE
-        for name, control, message, rule in self._valves.turns:
+        for name, control, message, rule in self.valves.turns:
             period = control.period_ticks
             if now // period - last // period:
                 transition = control.command(now_ns, self._stop, overrun)
@@ -276,16 +276,16 @@ class Controller:
         self.counters.add(FrameFault.SEND_FAILED)
         for protocol in self._protocols:
             protocol.send_failed(frame)
-        self._valves.send_failed(frame[:3])
+        self.valves.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
         """Return whether a late valve frame moves a valve, and so must not leave."""
-        return self._valves.withhold(frame)
+        return self.valves.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
         """Trip the axes of a valve frame that the gate has refused; see ``ValveMessages``."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
-        return self._valves.refused(frame)
+        return self.valves.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """Return a neutral frame for every valve, to be sent last; see ``not_neutral``."""
@@ -295,6 +295,6 @@ class Controller:
                 protocol.leave()
             except Exception as error:
                 errors.append(error)
-        frames = self._valves.neutral_frames(self.silent_buses, errors)
+        frames = self.valves.neutral_frames(self.silent_buses, errors)
         self.not_neutral = errors[0] if errors else None
         return frames

@@ -146,7 +146,10 @@ class GatedController:
         if of is not None:
             frame = frame._replace(data=of)
         neutral = self._controller.refused(frame)
-        return None if self._gate.leaving(key, neutral[3], of) else neutral
+        if not self._gate.leaving(key, neutral[3], of):
+            return neutral
+        self._controller.valves.take_back(key)
+        return None
 
 
 def _same(demand: float | None, command: object) -> bool:

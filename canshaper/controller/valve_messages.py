@@ -53,15 +53,15 @@ class ValveMessages:
             control.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late frame moves a valve, and so must not leave.
+        """Return whether a late frame moves a valve, and so must not leave."""
+        moves = any(control.axis.output.steps for control in self._axes[frame[:3]])
+        if moves:
+            self.take_back(frame[:3])
+        return moves
 
-        If so, its alive counter is taken back: the valve sees no gap.
-        """
-        controls = self._axes[frame[:3]]
-        if not any(control.axis.output.steps for control in controls):
-            return False
-        controls[-1].valve.take_back()
-        return True
+    def take_back(self, key: MessageKey) -> None:
+        """Take back the count of a frame that does not leave: its valve sees no gap."""
+        self._axes[key][0].valve.take_back()
 
     def refused(self, frame: Frame) -> Frame:
         """Trip the axes of a frame that the gate has refused.

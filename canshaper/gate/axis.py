@@ -79,7 +79,7 @@ class AxisState(AxisInput):
         self.ramp: float | None = None
         self.armed = False  # neutral was seen, valid and enabled, since the last reason to stop
         self.latched = False  # neutral does not arm before reset or enable is pressed again
-        self.cause = NEVER  # ``made`` at the last reason that latched
+        self.cause = NEVER  # number of the last frame at the last reason that latched
         self.why, self.stop_left = "start", 0  # why it is not armed
         self.now = 0.0  # demand in this period; 0 while not armed
         self.held = 0  # number of periods before this one with the demand on the same side
@@ -102,18 +102,29 @@ class AxisState(AxisInput):
         # a pause resets neither.
         self.way, self.alone = 0.0, 0
 
-    def halt(self, why: str, made: int, *, latch: bool) -> None:
-        """Stop the axis at once: no velocity may leave from now on; ``latch`` as after a trip."""
+    def halt(self, why: str, made: int, cause: int = NEVER, *, latch: bool) -> None:
+        """Stop the axis at once: no velocity may leave from now on.
+
+        ``latch`` as after a trip: until a press in a frame after the one of number ``cause``.
+        """
         if self.armed or self.last:
             self.zero_at = made
         self.armed, self.stop_left, self.why = False, 0, why
         if latch:
-            self.latched, self.cause = True, made
+            self.latched, self.cause = True, cause
         self.forth.forget()
         self.back.forget()
 
     def look(
-        self, why: str, demand: float | None, made: int, number: int, passed: int, *, latches: bool
+        self,
+        why: str,
+        demand: float | None,
+        made: int,
+        number: int,
+        passed: int,
+        *,
+        cause: int,
+        latches: bool,
     ) -> None:
         """Decide whether the axis may move in this period, and remember its demand.
 
@@ -121,6 +132,7 @@ class AxisState(AxisInput):
             why: the reason to stop at once, or empty; ``latches``: it latches at rest too.
             demand: demand of the joystick; None is a reason for a shaped stop.
             made, number, passed: as in the class; ``passed`` counts from the last turn.
+            cause: number of the frame with the reason; a lasting reason is as new as the last one.
         """
         of, before = self.of, self.now
         self.now = 0.0
@@ -129,7 +141,7 @@ class AxisState(AxisInput):
             self.last, self.top, self.high, self.zero_at = 0.0, of.step, of.step, made
         left = self.stop_left - passed if self.stop_left > passed else 0
         if why:
-            self.halt(why, made, latch=latches or self.last != 0.0)
+            self.halt(why, made, cause, latch=latches or self.last != 0.0)
         elif demand is None:
             self.stop_left = of.stop if self.armed else left
             self.armed, self.why = False, "joystick"
@@ -138,9 +150,7 @@ class AxisState(AxisInput):
             self.now = demand if self.armed else 0.0
         else:
             self.stop_left = 0
-            # The cause is noted in the axis' turn, up to a period after it was received: a press
-            # since the turn before may have come after the cause, and counts.
-            if not self.latched or self.joystick.pressed.press >= self.cause - of.period:
+            if not self.latched or self.joystick.pressed.press > self.cause:
                 self.latched, self.armed = False, True
         self.hard, self.latches, self.lost = "", False, False
         self._ask(before, number // of.period, passed)
@@ -252,7 +262,8 @@ class AxisState(AxisInput):
         """Keep the latch over a reload, and any reason to stop that no tick has seen yet."""
         self.latched = self.latched or before.latched
         self.cause = max(self.cause, before.cause)
-        self.hard, self.latches = self.hard or before.hard, self.latches or before.latches
+        if before.hard:
+            self.stop(before.hard, before.hard_at, latches=before.latches)
         self.foreign_ns = max(self.foreign_ns, before.foreign_ns)
 
 

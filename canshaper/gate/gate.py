@@ -17,6 +17,7 @@ class Gate:
         self.record = record
         self.number = -1  # number of the present deadline
         self.made = 0  # number of ticks that were run, without missed deadlines
+        self.frames = 0  # number of frames received
         self.stood = False  # the loop stood still, and no tick was run since
         self.others: dict[Key, int] = {}  # frames sent in this tick, by message that is no valve's
         self.messages = {name: Received(one) for name, one in record.messages.items()}
@@ -55,6 +56,7 @@ class Gate:
 
     def receive(self, key: Key, data: bytes, now_ns: int) -> Received | None:
         """Receive a frame; return its message if a joystick in it moves axes, else None."""
+        self.frames += 1
         message = self.ids.get(key) or self._by_group(key, now_ns)
         if message is None:
             return None
@@ -62,10 +64,10 @@ class Gate:
         says, counts = message.take(data, word, now_ns)
         if says:
             for switch in message.switches:
-                switch.take(word, self.made, counts=counts, stood=self.stood)
+                switch.take(word, self.frames, counts=counts, stood=self.stood)
         if counts:
             if message.joystick:
-                message.joystick.take(word, self.made, stood=self.stood)
+                message.joystick.take(word, self.frames, stood=self.stood)
             for axis in message.axes:
                 axis.take(word, now_ns)
         return message if message.axes else None
@@ -93,24 +95,25 @@ class Gate:
         """Stop a valve that another sender commands, unless we only listen."""
         if not self.record.listens:
             for axis in valve.axes:
-                axis.foreign_ns, axis.hard, axis.latches = now_ns, "second sender", True
+                axis.foreign_ns = now_ns
+                axis.stop("second sender", self.frames, latches=True)
 
     def disagrees(self, axes: Iterable[AxisInput]) -> None:
         """Stop axes: the controller's decoder has read another demand in their joystick's frame."""
         for axis in axes:
-            axis.hard = "decoders disagree"
+            axis.stop("decoders disagree", self.frames)
 
     def stalled(self) -> None:
         """Stop every axis after a standstill; frames until the next tick count as old."""
         self.stood = True
         for axis in self.axes.values():
-            axis.halt("loop stalled", self.made + 1, latch=axis.last != 0.0)
+            axis.halt("loop stalled", self.made + 1, self.frames, latch=axis.last != 0.0)
 
     def send_failed(self, key: Key) -> None:
         """Stop the moving axes of a valve frame that did not reach its bus."""
         for axis in self.valves[key].axes if key in self.valves else ():
             if axis.last:
-                axis.halt("send failed", self.made + 1, latch=True)
+                axis.halt("send failed", self.made + 1, self.frames, latch=True)
 
     def withheld(self, key: Key) -> None:
         """Take back the count of a valve frame that was too late and did not leave."""
@@ -149,9 +152,11 @@ class Gate:
             axis.due = passed > 0
             if axis.due:
                 due.append(axis)
-                why, latches = rules.stop_at_once(axis, self.stop, now_ns)
+                why, latches, lasts = rules.stop_at_once(axis, self.stop, now_ns)
                 demand = None if why else rules.demand_of(axis, now_ns)
-                axis.look(why, demand, self.made, self.number, passed, latches=latches)
+                cause = self.frames if lasts else axis.hard_at
+                made, number = self.made, self.number
+                axis.look(why, demand, made, number, passed, cause=cause, latches=latches)
         for axis in due:
             axis.share()
             axis.least, axis.most = rules.bounds(axis)
@@ -192,7 +197,7 @@ class Gate:
     def refused(self, key: Key) -> None:
         """Stop the axes of a refused frame; they wait for a reset."""
         for axis in self.valves[key].axes:
-            axis.halt("refused", self.made, latch=True)
+            axis.halt("refused", self.made, self.frames, latch=True)
 
     def last(self, key: Key, data: bytes) -> str:
         """Return why a frame may not be the last one: its bytes have to be right, and neutral."""
@@ -214,7 +219,7 @@ class Gate:
             before: the gate of the file before.
             reopened: buses that were closed meanwhile: no frame received on them counts as good.
         """
-        self.made = before.made
+        self.made, self.frames = before.made, before.frames
         places, were = self.record.places, before.record.places
         messages = {_known_by(one.of, were): one for one in before.messages.values()}
         for message in self.messages.values():

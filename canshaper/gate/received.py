@@ -20,17 +20,22 @@ class AxisInput:
         changed_ns: time since when the demand has this value.
         foreign_ns: time when a second sender was received last.
         hard: a reason to stop at once, or empty.
+        hard_at: number of the frame that gave it.
         latches: whether any of these reasons latches at rest too.
         lost: whether another joystick has taken over meanwhile.
     """
 
-    __slots__ = ("changed_ns", "demand", "foreign_ns", "hard", "latches", "lost", "of")
+    __slots__ = ("changed_ns", "demand", "foreign_ns", "hard", "hard_at", "latches", "lost", "of")
 
     def __init__(self, axis: Axis) -> None:
         self.of = axis
         self.demand: float | None = None
         self.changed_ns, self.foreign_ns = 0, NEVER
-        self.hard, self.latches, self.lost = "", False, False
+        self.hard, self.hard_at, self.latches, self.lost = "", NEVER, False, False
+
+    def stop(self, why: str, at: int, *, latches: bool = False) -> None:
+        """Stop the axis in its turn, for a reason in the frame of this number."""
+        self.hard, self.hard_at, self.latches = why, at, self.latches or latches
 
     def take(self, word: Word, now_ns: int) -> None:
         """Store the demand of a joystick frame that counts."""
@@ -126,10 +131,10 @@ class SwitchState:
         self.on = False  # whether it is on in the last frame that counts
         self.released = False  # set by any frame that says so, cleared only by one that counts
         self.was_off = False  # whether it was seen released since its last press
-        self.press = NEVER  # ``made`` at its last press, or at the last press of reset
+        self.press = NEVER  # number of the frame with its last press, or with that of reset
 
-    def take(self, word: Word, made: int, *, counts: bool, stood: bool) -> None:
-        """Receive a frame; a frame that has waited during a standstill is no press."""
+    def take(self, word: Word, number: int, *, counts: bool, stood: bool) -> None:
+        """Receive the frame of this number; one that has waited in a standstill is no press."""
         of = self.of
         raw = of.field.raw(word)
         on = raw == of.on
@@ -137,15 +142,15 @@ class SwitchState:
             self.on = on
         if raw == 0 if of.only_zero else not on:
             self.released = self.was_off = True
+            why = "emergency stop" if self.emergency else "enable"
             for axis in self.axes:
-                axis.hard = "emergency stop" if self.emergency else "enable"
-                axis.latches = axis.latches or self.emergency
+                axis.stop(why, number, latches=self.emergency)
         elif counts:
             self.released = False
             if on and self.was_off:
                 self.was_off = False
                 if not stood:
-                    self.press = made
+                    self.press = number
 
     def off(self, now_ns: int) -> bool:
         """Return whether the switch is off now, or its state is not known."""
@@ -163,8 +168,8 @@ class JoystickState:
         self.gone = ""  # why all its axes have to stop at once in this tick, or empty
         self.valid = False  # whether its demand may be used in this tick
 
-    def take(self, word: Word, made: int, *, stood: bool) -> None:
-        """Receive a frame that counts; one that has waited during a standstill is no press."""
+    def take(self, word: Word, number: int, *, stood: bool) -> None:
+        """Receive the frame of this number, which counts; in a standstill it is no press."""
         of = self.of
         bypassed = of.bypass is not None and of.bypass.raw(word) == 1
         self.flips += bypassed is not self.bypassed
@@ -172,7 +177,7 @@ class JoystickState:
         if of.reset is not None:
             reset = of.reset.raw(word) == 1
             if reset and not self.was_reset and not stood:
-                self.pressed.press = made
+                self.pressed.press = number
             self.was_reset = reset
 
     def look(self, now_ns: int) -> None:

@@ -14,17 +14,18 @@ OTHERS = 8
 """Most frames in a tick of one message that is no valve's: we may answer several nodes at once."""
 
 
-def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool]:
+def stop_at_once(axis: AxisState, stop: SwitchState | None, now_ns: int) -> tuple[str, bool, bool]:
     """Rule 1: enable, emergency stop, second sender; no limit: a reason seen once is enough.
 
-    Returns the reason, or empty; and whether it latches at rest too. In motion it always does.
+    Returns the reason, or empty; whether it latches at rest too, in motion it always does; and
+    whether it is still there.
     """
-    why, latches = axis.hard, axis.latches
+    why, latches, lasts = axis.hard, axis.latches, axis.joystick.gone != ""
     if stop is not None and stop.off(now_ns):
-        why, latches = "emergency stop", latches or stop.released
+        why, latches, lasts = "emergency stop", latches or stop.released, True
     if now_ns - axis.foreign_ns <= FOREIGN_NS:
-        why, latches = "second sender", True
-    return why or axis.joystick.gone, latches
+        why, latches, lasts = "second sender", True, True
+    return why or axis.joystick.gone, latches, lasts
 
 
 def demand_of(axis: AxisState, now_ns: int) -> float | None:

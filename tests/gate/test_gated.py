@@ -64,6 +64,19 @@ def test_one_that_goes_on_is_logged_once_a_second() -> None:
     assert sum("output=refused" in e.text for e in wrong.controller.events) == 2
 
 
+def test_a_tick_whose_neutral_is_refused_too_leaves_no_gap_in_the_count() -> None:
+    wrong = Wrong()
+    wrong.control._put = wrong.sound
+    for _ in range(3):
+        assert wrong.tick()
+    sound = wrong.control.valve._encode
+    wrong.control.valve._encode = lambda raw: sound(raw)[:-1]  # type: ignore[method-assign]
+    assert not wrong.tick()
+    wrong.control.valve._encode = sound  # type: ignore[method-assign]
+    assert wrong.tick()
+    assert wrong.tick()
+
+
 def test_what_the_loop_says_reaches_the_controller() -> None:
     wrong = Wrong()
     wrong.control._put = wrong.sound

@@ -104,6 +104,17 @@ class TestStopsAtOnce:
         one.rests(2, reset=True)
         assert one.axis.armed
 
+    def test_a_press_in_the_same_tick_just_before_it_is_no_reset(self) -> None:
+        one = self.moving()
+        one.receive(one.joysticks(reset=True, near_far=1.0))
+        one.gate.disagrees([one.axis])
+        assert "why=decoders" in one.sent(60)
+        one.rests(5, reset=True)
+        assert not one.axis.armed
+        one.rests(1)
+        one.rests(2, reset=True)
+        assert one.axis.armed
+
     def test_a_press_just_after_it_is_one(self) -> None:
         one = self.moving()
         one.gate.send_failed(one.key)
@@ -118,7 +129,7 @@ class TestStopsAtOnce:
         assert one.axis.armed
 
     def test_released_and_pressed_between_two_ticks(self) -> None:
-        """Whichever was first: a press that may be the later one is a reset."""
+        """A press after the reason is a reset."""
         one = self.moving()
         one.receive(one.joysticks(enable=False))
         one.rests(1)

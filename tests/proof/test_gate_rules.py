@@ -166,7 +166,7 @@ def test_neutral_first() -> None:
         integer("press"),
         integer("cause"),
     )
-    passed, sent_at = integer("passed"), integer("sent_at")
+    passed, sent_at, at = integer("passed"), integer("sent_at"), integer("at")
     start = (axis.armed, axis.latched, axis.stop_left, axis.last, axis.top, axis.now)
     most_of = axis.forth.most, axis.back.most
 
@@ -177,9 +177,9 @@ def test_neutral_first() -> None:
         axis.joystick.pressed.press = press
         why = "enable" if stops else ""
         given = demand if there else None
-        axis.look(why, given, 1000, 1000, passed, latches=bool(latches))
+        axis.look(why, given, 1000, 1000, passed, cause=at, latches=bool(latches))
         neutral = both(no(stops), there, size(demand) <= of.stick.band)
-        pressed = press >= cause - of.period
+        pressed = press > cause
         now_seen = both(no(stops), either(seen, both(neutral, either(no(start[1]), pressed))))
         may = bool(axis.armed) or bool(axis.stop_left)
         may_move = not rules.neutral_first(axis)
