@@ -16,6 +16,8 @@ class Frame(NamedTuple):
     data: bytes
 
 
+MessageKey = tuple[str, int, bool]
+"""The first three of a ``Frame``: bus, identifier, and whether that has 29 bits."""
 new_frame = tuple.__new__
 """``new_frame(Frame, (bus, can_id, extended, data))`` is ``Frame(...)`` in half the time."""
 

@@ -18,8 +18,8 @@ _SECTIONS = ("sway", "filter", "limits")
 _KEY = re.compile(r"axes\.(.+)\.(\w+)\.(\w+)")
 
 
-class Key(NamedTuple):
-    """Key of a number in the deployment file: ``axes.AXIS.SECTION.NAME``."""
+class AxisKey(NamedTuple):
+    """AxisKey of a number in the deployment file: ``axes.AXIS.SECTION.NAME``."""
 
     axis: str
     section: str
@@ -35,14 +35,16 @@ class Key(NamedTuple):
         return f"axes.{self.axis}.{self.section}.{self.name}"
 
 
-def value(config: AxisSection, key: Key) -> float | None:
+def value(config: AxisSection, key: AxisKey) -> float | None:
     """Return the number at a key; None where the section has no number of that name."""
     section = getattr(config, key.section, None) if key.section in _SECTIONS else None
     number = getattr(section, key.name, None)
     return number if isinstance(number, float) else None
 
 
-def adjusted(config: AxisSection, values: Mapping[Key, float], file: AxisSection) -> AxisSection:
+def adjusted(
+    config: AxisSection, values: Mapping[AxisKey, float], file: AxisSection
+) -> AxisSection:
     """Return the configuration of an axis with some numbers changed.
 
     A changed period stretches a filter that is made for one period, always from the file's filter.
@@ -81,7 +83,7 @@ def _with(section: S, name: str, new: Mapping[str, Any]) -> S:
         raise ValueError(f"{where}: {first.get('ctx', {}).get('error', first['msg'])}") from None
 
 
-def faults(key: Key, config: AxisSection, low: float, high: float) -> Iterator[str]:
+def faults(key: AxisKey, config: AxisSection, low: float, high: float) -> Iterator[str]:
     """Yield the reasons why a number of an axis cannot be adjustable within [low, high]."""
     now = value(config, key)
     if now is None:

@@ -5,7 +5,7 @@ A changed number holds until the daemon ends, or reads its file again.
 
 from collections.abc import Iterable, Mapping
 
-from canshaper.config.adjust import Key, adjusted, value
+from canshaper.config.adjust import AxisKey, adjusted, value
 from canshaper.config.schema import AxisSection
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
@@ -51,7 +51,7 @@ class Adjuster:
                 number has changed.
         """
         numbers = dict(self._checked(values))
-        by_axis: dict[str, dict[Key, float]] = {}
+        by_axis: dict[str, dict[AxisKey, float]] = {}
         for key, number in numbers.items():
             by_axis.setdefault(key.axis, {})[key] = number
         configs = {
@@ -72,7 +72,7 @@ class Adjuster:
         assert number is not None  # checked with the deployment
         return number
 
-    def _checked(self, values: Mapping[str, object]) -> Iterable[tuple[Key, float]]:
+    def _checked(self, values: Mapping[str, object]) -> Iterable[tuple[AxisKey, float]]:
         if not values:
             raise ValueError("expected a number to change, got none")
         if len(values) > MOST_NUMBERS:
@@ -89,7 +89,9 @@ class Adjuster:
                 raise ValueError(f"{text}: expected {low:g} to {high:g}, got {number:g}")
             yield _key(text), float(number)
 
-    def _config(self, name: str, control: AxisControl, values: Mapping[Key, float]) -> AxisSection:
+    def _config(
+        self, name: str, control: AxisControl, values: Mapping[AxisKey, float]
+    ) -> AxisSection:
         try:
             config = adjusted(control.bound.config, values, self._deployment.config.axes[name])
         except ValueError as error:
@@ -109,7 +111,7 @@ class Adjuster:
         return config
 
 
-def _key(text: str) -> Key:
-    key = Key.parsed(text)
+def _key(text: str) -> AxisKey:
+    key = AxisKey.parsed(text)
     assert key is not None  # checked with the deployment
     return key

@@ -5,17 +5,17 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 
 from collections.abc import Iterator
 
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault, MessageKey
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.couplings import Couplings
 from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.machine_inputs import MachineInputs, parts
 from canshaper.controller.status_messages import SensorReport, StatusMessages
 from canshaper.controller.valve_messages import Counters, OverrunDetector, ValveMessages
-from canshaper.inputs.input import Key, Part, carry_over
+from canshaper.inputs.input import Part, PartKey, carry_over
 from canshaper.inputs.stops import EnableGate
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
+from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler
 from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason, State, Transition
 
@@ -97,7 +97,7 @@ class Controller:
                 self._invalidate(name)
                 self.on_bus_off(name)
 
-    def _parts(self) -> dict[Key, Part]:
+    def _parts(self) -> dict[PartKey, Part]:
         return parts(
             self.deployment, self._senders.values(), self.inputs, self.axes, self._protocols
         )

@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator, Mapping
 
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault, MessageKey
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import DisagreementEvent, RefusalEvent
 from canshaper.gate.build import record_of
 from canshaper.gate.fields import EPSILON
 from canshaper.gate.gate import Gate
 from canshaper.gate.received import Received
-from canshaper.protocols.interface import MessageKey
 
 # A refusal, or a disagreement of decoders, that repeats is logged once in this time.
 QUIET_NS = 1_000_000_000

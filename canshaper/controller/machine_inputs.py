@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from canshaper.codec.frame import MessageKey
 from canshaper.codec.message import Sender
 from canshaper.config.limits import Position
 from canshaper.controller.axis_control import AxisControl
-from canshaper.inputs.input import Key, MessageInput, Part, Switch, SwitchInput
+from canshaper.inputs.input import MessageInput, Part, PartKey, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.stops import EmergencyStopInput
 from canshaper.inputs.value import (
@@ -20,7 +21,7 @@ from canshaper.inputs.value import (
 )
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundValue, Choosing
-from canshaper.protocols.interface import BusProtocol, MessageKey
+from canshaper.protocols.interface import BusProtocol
 
 if TYPE_CHECKING:
     from canshaper.inputs.sway_sensor import SwaySensorInput
@@ -131,7 +132,7 @@ def parts(
     inputs: Mapping[tuple[str, int, bool], Part],
     axes: Mapping[str, AxisControl],
     protocols: Iterable[BusProtocol],
-) -> dict[Key, Part]:
+) -> dict[PartKey, Part]:
     """Return every part that a reload carries over, by its key.
 
     The key of a bus is its interface and channel, that of a message its identifier: a bus or a
@@ -146,7 +147,7 @@ def parts(
     """
     places = {n: (bus.interface, bus.channel) for n, bus in deployment.config.buses.items()}
 
-    def by_key() -> Iterator[tuple[Key, Part]]:
+    def by_key() -> Iterator[tuple[PartKey, Part]]:
         for (bus, *message), entry in inputs.items():
             yield ("input", *places[bus], *message), entry
         for sender in senders:

@@ -4,13 +4,12 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.message import Sender
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.events import SwaySensorEvent, SwingLengthEvent
 from canshaper.controller.valve_messages import Counters
 from canshaper.machine.deployment import BoundMotion, Deployment
-from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.demand_bounds import RunOn
 from canshaper.shaping.states import State, Trust
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Self
 
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault, MessageKey
 from canshaper.codec.message import Sender
 from canshaper.controller.axis_control import AxisControl
-from canshaper.protocols.interface import ForwardingRule, MessageKey
+from canshaper.protocols.interface import ForwardingRule
 from canshaper.shaping.states import Reason
 
 Turn = tuple[str, AxisControl, Sender | None, ForwardingRule | None]

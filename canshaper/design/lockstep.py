@@ -8,13 +8,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Protocol, TypedDict, Unpack
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.controller.controller import Controller
 from canshaper.controller.gated import GatedController
 from canshaper.errors import DriveError
 from canshaper.gate.cycle import FrameProcessor, Standstill, io_cycle
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import Key
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.grapple import Grapple, Sway
@@ -27,7 +26,7 @@ from canshaper_sim.unit import unit_of
 
 OnFrame = Callable[[Frame, float], object]
 """Called with a frame and its time in s."""
-Received = Callable[[Key], bool]
+Received = Callable[[MessageKey], bool]
 
 
 class Joysticks(Protocol):
@@ -56,7 +55,7 @@ class PlantPort:
         plant: PlantNode,
         received: Received | None,
         on_frame: OnFrame | None,
-        sends: frozenset[Key] | None = None,
+        sends: frozenset[MessageKey] | None = None,
     ) -> None:
         self.arrived_ns = 0
         self._plant, self._on_frame = plant, on_frame
@@ -145,7 +144,7 @@ class LockStep:
         self.time_ms = time_ms + tick_ms
 
 
-def _sends(deployment: Deployment) -> frozenset[Key] | None:
+def _sends(deployment: Deployment) -> frozenset[MessageKey] | None:
     """Return the messages that a listening deployment may send; None for one that drives."""
     if not deployment.listen_only:
         return None

@@ -21,7 +21,7 @@ from typing import Any
 
 import yaml
 
-from canshaper.config.adjust import Key
+from canshaper.config.adjust import AxisKey
 from canshaper.config.schema import AxisSection
 from canshaper.config.section import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source, read_bounded
@@ -215,7 +215,7 @@ def sections_of(values: Mapping[str, float]) -> dict[Place, dict[str, float | No
     """
     sections: dict[Place, dict[str, float | None]] = {}
     for text, number in values.items():
-        key = Key.parsed(text)
+        key = AxisKey.parsed(text)
         assert key is not None  # the daemon took it
         numbers = sections.setdefault(("axes", key.axis, key.section), {})
         numbers[key.name] = number

@@ -9,7 +9,7 @@ from canshaper.codec.message import SequenceChecker
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
-Key = tuple[Hashable, ...]
+PartKey = tuple[Hashable, ...]
 
 
 class Part(Protocol):
@@ -22,7 +22,7 @@ class Part(Protocol):
         """Copy the state of the same part of the old controller."""
 
 
-def carry_over(before: Mapping[Key, Part], parts: Mapping[Key, Part]) -> None:
+def carry_over(before: Mapping[PartKey, Part], parts: Mapping[PartKey, Part]) -> None:
     """Copy the state of each part from the part with the same key and type; others start new.
 
     Args:

@@ -8,6 +8,7 @@ from typing import Any
 
 from cantools.database.can import Message
 
+from canshaper.codec.frame import MessageKey
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.message import SentMessage
 from canshaper.codec.status import AIM, StatusCodec
@@ -22,7 +23,7 @@ from canshaper.machine.identity import Identity, bind_status
 from canshaper.machine.inputs import Bound, BoundValue, Choosing, bind_radius
 from canshaper.machine.joysticks import BoundJoystick, BoundSwitches
 from canshaper.machine.lookup import Lookup
-from canshaper.machine.routing import Key, Routing, build_routing
+from canshaper.machine.routing import Routing, build_routing
 from canshaper.machine.used_message import NamedCode, StartValue
 from canshaper.machine.valves import BoundAxis
 
@@ -111,7 +112,7 @@ class Deployment:
     profile: BoundValue[Choosing] | None
     switches: list[BoundSwitches]
     on_bus: dict[str, list[Message]]
-    fd: frozenset[Key]
+    fd: frozenset[MessageKey]
     """Used messages that are sent in frames of CAN FD."""
     source: Source = field(compare=False)
     """The deployment file with line numbers, for problems that show only on this computer."""

@@ -45,10 +45,10 @@ def _check_ends(lookup: Lookup, axis: AxisSection, name: str, period_s: float) -
     control, rate = lookup.config.control, axis.limits.slowest_per_s
     if control is None:
         return
-    from canshaper.config.adjust import Key, adjusted, faults
+    from canshaper.config.adjust import AxisKey, adjusted, faults
 
     for text, ends in control.adjustable.items():
-        key = Key.parsed(text)
+        key = AxisKey.parsed(text)
         if key is None or (key.axis, key.section) != (name, "sway") or [*faults(key, axis, *ends)]:
             continue
         for end in ends:
@@ -152,12 +152,12 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
     """Check that every adjustable number may change in motion, and speeds with rehearse_faults."""
     if config.control is None:
         return
-    from canshaper.config.adjust import Key, faults
+    from canshaper.config.adjust import AxisKey, faults
 
     add, slow = diagnostics.add, config.control.rehearse_faults
     for text, (low, high) in config.control.adjustable.items():
         place = ("control", "adjustable", text)
-        key = Key.parsed(text)
+        key = AxisKey.parsed(text)
         if key is None:
             add(place, "expected axes.AXIS.SECTION.NAME, got no key of an axis")
         elif diagnostics.check_name(place, "an axis", key.axis, config.axes):

@@ -14,6 +14,7 @@ from canshaper.codec.frame import (
     NMT,
     NULL,
     REQUEST,
+    MessageKey,
     claims_of,
     group_of,
     identifier,
@@ -24,9 +25,6 @@ from canshaper.config.bus import Bus
 from canshaper.config.schema import DeploymentConfig
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.valves import BoundAxis
-
-Key = tuple[str, int, bool]
-"""(bus, id, whether the id is extended)."""
 
 
 class Role(Enum):
@@ -110,18 +108,18 @@ class Routing:
         buses: routes of each bus, for its sockets.
     """
 
-    routes: Mapping[Key, Route]
+    routes: Mapping[MessageKey, Route]
     groups: Mapping[tuple[str, int], GroupRoute]
-    valves: Mapping[Key, tuple[str, ...]]
+    valves: Mapping[MessageKey, tuple[str, ...]]
     others: frozenset[tuple[int, bool]]
     buses: Mapping[str, BusRoutes]
 
     @property
-    def sent(self) -> frozenset[Key]:
+    def sent(self) -> frozenset[MessageKey]:
         """Messages that we send, and no one else may send."""
         return frozenset(k for k, r in self.routes.items() if r.role in (Role.VALVE, Role.SENT))
 
-    def received(self, key: Key) -> bool:
+    def received(self, key: MessageKey) -> bool:
         """Return whether we receive a message: it has a route, or no DBC file lists it."""
         bus, can_id, extended = key
         group = extended and (bus, group_of(can_id)) in self.groups
@@ -143,10 +141,10 @@ def build_routing(
     *,
     inputs: Sequence[BoundInput],
     axes: Iterable[BoundAxis],
-    statuses: Iterable[Key],
+    statuses: Iterable[MessageKey],
     known: Iterable[tuple[int, bool]],
     j1939: Container[str],
-    fd: Iterable[Key],
+    fd: Iterable[MessageKey],
     listen_only: bool,
 ) -> Routing:
     """Build the routing table of a deployment.
@@ -162,7 +160,7 @@ def build_routing(
         listen_only: whether we send only status, and another controller drives the valves.
     """
     axes = list(axes)
-    valves: dict[Key, tuple[str, ...]] = {}
+    valves: dict[MessageKey, tuple[str, ...]] = {}
     for axis in axes:
         key = axis.valve.message.key
         valves[key] = (*valves.get(key, ()), axis.name)
@@ -197,7 +195,7 @@ def build_routing(
     return Routing(routes, groups, valves, ids - used, buses)
 
 
-def _ids(routes: Mapping[Key, Route], bus: str, *roles: Role) -> frozenset[tuple[int, bool]]:
+def _ids(routes: Mapping[MessageKey, Route], bus: str, *roles: Role) -> frozenset[tuple[int, bool]]:
     """Return the ids of one bus with these roles, but not of inputs received by their group."""
     return frozenset(
         key[1:]
@@ -206,7 +204,7 @@ def _ids(routes: Mapping[Key, Route], bus: str, *roles: Role) -> frozenset[tuple
     )
 
 
-def _node_routes(name: str, bus: Bus, listen_only: bool) -> Iterator[tuple[Key, Route]]:
+def _node_routes(name: str, bus: Bus, listen_only: bool) -> Iterator[tuple[MessageKey, Route]]:
     """Yield the routes of messages with which J1939 or CANopen nodes report themselves on a bus."""
     if bus.canopen:
         for node in bus.canopen.nodes.values():

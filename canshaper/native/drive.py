@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.velocity import VelocitySignal
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
@@ -17,7 +17,6 @@ from canshaper.controller.couplings import MotionControl
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
-from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve

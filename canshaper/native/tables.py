@@ -12,6 +12,7 @@ from typing import Any
 
 from cantools.database.can import Message
 
+from canshaper.codec.frame import MessageKey
 from canshaper.codec.layout import CLASSICAL_BYTES, is_fd, is_j1939
 from canshaper.codec.message import SequenceChecker
 from canshaper.codec.signals import find_signal, special_codes
@@ -23,7 +24,6 @@ from canshaper.controller.couplings import MotionControl
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
-from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.axis import ShapedAxis
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.gff import Gff

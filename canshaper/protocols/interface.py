@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Protocol
 
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault, MessageKey
 from canshaper.codec.message import Sender
-from canshaper.inputs.input import Key, MessageInput, Part
+from canshaper.inputs.input import MessageInput, Part, PartKey
 from canshaper.inputs.stops import StopCauses
 from canshaper.inputs.value import Feedback
 from canshaper.machine.valves import BoundAxis
@@ -13,9 +13,6 @@ from canshaper.shaping.axis import ShapedAxis
 
 if TYPE_CHECKING:
     from canshaper.inputs.sway_sensor import SensorNode
-
-MessageKey = tuple[str, int, bool]
-"""Bus, identifier, and whether that has 29 bits."""
 
 
 class Event(Protocol):
@@ -136,6 +133,6 @@ class BusProtocol:
     def leave(self) -> None:
         """Prepare the end: the next frame of every valve is the last one."""
 
-    def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
+    def parts(self, places: Mapping[str, PartKey]) -> Iterator[tuple[PartKey, Part]]:
         """Yield parts that a reload carries over besides ``inputs``; ``places``: keys by bus."""
         yield from ()

@@ -7,14 +7,13 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from canshaper.codec.frame import Frame, FrameFault, group_of
+from canshaper.codec.frame import Frame, FrameFault, MessageKey, group_of
 from canshaper.codec.layout import Layout
 from canshaper.config.bus import Bus
 from canshaper.errors import CutOffError, LogError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
-from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
 from canshaper.protocols.j1939.groups import AnySource, ReceivedGroup
 
@@ -76,14 +75,14 @@ class Sorter:
         identity = deployment.identity_status
         self._kinds = {identity.message.key: Kind.IGNORED} if identity else {}
 
-    def kind(self, key: Key) -> Kind:
+    def kind(self, key: MessageKey) -> Kind:
         """Return the kind of a frame by its key: bus, id and whether the id is extended."""
         kind = self._kinds.get(key)
         if kind is None:
             kind = self._kinds[key] = self._judge(key)
         return kind
 
-    def _judge(self, key: Key) -> Kind:
+    def _judge(self, key: MessageKey) -> Kind:
         bus, message = key[0], key[1:]
         ids = self._buses[bus]
         if message in ids.sent or message in ids.claims:
@@ -182,7 +181,7 @@ class InputFinder(Generic[_Input]):
     """
 
     def __init__(self, buses: Mapping[str, Bus], inputs: Iterable[_Input]) -> None:
-        self._by_key: dict[Key, _Input] = {}
+        self._by_key: dict[MessageKey, _Input] = {}
         self._by_group: dict[tuple[str, int], ReceivedGroup] = {}
         self._input: _Input | None = None
         for bound in inputs:

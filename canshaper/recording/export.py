@@ -12,11 +12,10 @@ from pathlib import Path
 from cantools.database.can import Message, Signal
 
 from canshaper.bus.packet import FDF
-from canshaper.codec.frame import NULL, Frame, with_source
+from canshaper.codec.frame import NULL, Frame, MessageKey, with_source
 from canshaper.codec.layout import CLASSICAL_BYTES, Layout, layout_fault
 from canshaper.errors import UsageError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import Key
 from canshaper.recording.form import AXIS, EXTRAS, POSE, Channel, Group, Row, Writer, install
 from canshaper.recording.listen import History, ReceivedFrame
 from canshaper.recording.ticks import STATE_CHANGE, Result, Tick
@@ -148,7 +147,7 @@ class _Decoder:
         self._messages, self._writer = deployment.messages, writer
         entries = [entry for file in deployment.messages.files for entry in file.entries]
         self._names = {entry.key: entry.name for entry in entries}
-        self._known: dict[Key, _Known | None] = {}
+        self._known: dict[MessageKey, _Known | None] = {}
         self._rows: dict[str, Row] = {}
 
     def decode(self, frame: ReceivedFrame) -> tuple[str, dict[str, float]] | None:

@@ -27,12 +27,11 @@ from canshaper.bus.packet import (
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import MOST_FAILURES, open_python_can, waiting
 from canshaper.bus.socketcan import dropped_frames, open_sockets
-from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
+from canshaper.codec.frame import EFF_MASK, ERR_FLAG, RTR_FLAG, MessageKey, id_of
 from canshaper.codec.status import LAST_FAULT, StatusCodec
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import Key
 
 # Frames read from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
@@ -250,7 +249,7 @@ class History:
         self.counted_ns: int | None = None
         self.changes: list[HistoryEvent] = []
         self._axes = {a.status.message.key: n for n, a in deployment.axes.items() if a.status}
-        self._codecs: dict[Key, StatusCodec[Any]] = {
+        self._codecs: dict[MessageKey, StatusCodec[Any]] = {
             axis.status.message.key: axis.status for axis in deployment.axes.values() if axis.status
         }
         if deployment.status:

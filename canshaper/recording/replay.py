@@ -7,11 +7,10 @@ from itertools import islice
 from pathlib import Path
 
 from canshaper.blackbox.file import SUFFIX, Box, read_box
-from canshaper.codec.frame import Frame, group_of, new_frame
+from canshaper.codec.frame import Frame, MessageKey, group_of, new_frame
 from canshaper.controller.controller import Controller
 from canshaper.errors import BoxError, CutOffError, LogError, StateError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import Key
 from canshaper.recording.channels import Kind, Sorter, TimedFrame, bus_of_channel
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import Player, frames_of, of_its_copies, of_same_files
@@ -115,7 +114,7 @@ class Replay:
 
     def __init__(self, deployment: Deployment, drive: Drive) -> None:
         self.exact = drive.exact
-        self.received: Counter[Key] = Counter()
+        self.received: Counter[MessageKey] = Counter()
         self.verdict = Verdict()
         self.cut_off = drive.box.cut_off if drive.box else ""
         self.never_ready: dict[str, Counter[Reason]] = {}
@@ -211,7 +210,7 @@ class Replay:
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
         """Yield the frames of the log that a daemon of the deployment would see."""
         channels, box = self._drive.channels, self._drive.box
-        known: dict[Key, tuple[str, Kind]] = {}
+        known: dict[MessageKey, tuple[str, Kind]] = {}
         new, ignored = new_frame, Kind.IGNORED
         try:
             for time_ns, channel, can_id, extended, data in frames_of(box) if box else self.log:

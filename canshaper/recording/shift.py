@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
+from canshaper.codec.frame import MessageKey
 from canshaper.controller.axis_control import LEAST_RADIUS_M
 from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.inputs.value import PositionInput, Value
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import frames_of
@@ -258,12 +258,15 @@ class _Readers:
     def __init__(self, deployment: Deployment) -> None:
         self.tick_ns = 1_000_000 * deployment.config.tick_ms
         axes = {n: _Axis(one, self.tick_ns / 1e9) for n, one in deployment.axes.items()}
-        self.axes, self.of = axes, defaultdict[Key, list[Callable[[bytes, int], object]]](list)
+        self.axes, self.of = (
+            axes,
+            defaultdict[MessageKey, list[Callable[[bytes, int], object]]](list),
+        )
         self.cranes = []
         for crane in cranes(deployment) or [""]:
             own = {n: one for n, one in axes.items() if not crane or n.startswith(f"{crane}_")}
             self.cranes.append(_Crane(crane, own, deployment.config.still_deg))
-        sensors: dict[Key, SwaySensorInput] = {}
+        sensors: dict[MessageKey, SwaySensorInput] = {}
         for axis in axes.values():
             bound = axis.bound
             self.of[bound.valve.message.key].append(axis.on_valve_frame)

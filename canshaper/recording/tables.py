@@ -13,10 +13,9 @@ from operator import itemgetter
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
 from canshaper.errors import LogError
-from canshaper.machine.routing import Key
 from canshaper.recording.asc import lines, shown
 from canshaper.recording.channels import LATEST_S, MOST_BYTES, Place, TimedFrame
 from canshaper.recording.ticks import Result, Tick
@@ -241,7 +240,7 @@ class LogWriter:
     """
 
     def __init__(
-        self, file: TextIO, channel_of: Mapping[str, str], fd: Collection[Key] = ()
+        self, file: TextIO, channel_of: Mapping[str, str], fd: Collection[MessageKey] = ()
     ) -> None:
         self._file, self._fd = file, fd
         # A log without channels gets the names of the buses.

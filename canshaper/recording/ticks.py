@@ -6,12 +6,11 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
 from canshaper.controller.gated import GatedController
 from canshaper.gate.cycle import Standstill, io_cycle
-from canshaper.machine.routing import Key
 from canshaper.recording.channels import Kind
 from canshaper.shaping.states import Reason, State
 from canshaper.shaping.sway import SwayMode
@@ -70,7 +69,7 @@ new_row = tuple.__new__  # Row(...) in half the time
 class Difference:
     """A frame that differs from the recorded one; None for a frame that is missing."""
 
-    key: Key
+    key: MessageKey
     ours: bytes | None
     recorded: bytes | None
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from canshaper.commissioning import control_client as client
 from canshaper.commissioning.origins import write_numbers
-from canshaper.config.adjust import Key, value
+from canshaper.config.adjust import AxisKey, value
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
 from canshaper.edit.edit import edited, sections_of
@@ -182,7 +182,7 @@ class LiveNumbers:
         axes = load_config(self._file)[0].axes
         values = {}
         for text, now in self._now().items():
-            key = Key.parsed(text)
+            key = AxisKey.parsed(text)
             assert key is not None  # the daemon has it
             if key.axis in axes and value(axes[key.axis], key) != now:
                 values[text] = now

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.config.adjust import Key, adjusted
+from canshaper.config.adjust import AxisKey, adjusted
 from canshaper.config.limits import Sway
 from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
 from canshaper.machine.deployment import Deployment
@@ -178,9 +178,9 @@ def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, 
         By axis: ``lengths_m`` of a simple pendulum of the same period; ``left``, the fraction of
         the swing without a filter; the length that the filter ``believes``; that of the ``file``.
     """
-    by_axis: dict[str, dict[Key, float]] = {}
+    by_axis: dict[str, dict[AxisKey, float]] = {}
     for text, number in values.items():
-        key = Key.parsed(text)
+        key = AxisKey.parsed(text)
         if key is not None:
             by_axis.setdefault(key.axis, {})[key] = number
     tick_s = deployment.config.tick_ms / 1000.0
@@ -192,7 +192,7 @@ def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, 
     return curves
 
 
-def _curve(bound: BoundAxis, values: Mapping[Key, float], period_s: float) -> dict[str, Any]:
+def _curve(bound: BoundAxis, values: Mapping[AxisKey, float], period_s: float) -> dict[str, Any]:
     config = adjusted(bound.config, values, bound.config) if values else bound.config
     assert config.sway is not None and bound.config.sway is not None
     mode = config.sway.mode()

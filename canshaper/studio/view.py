@@ -7,13 +7,12 @@ from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.codec.frame import NULL, Frame, with_source
+from canshaper.codec.frame import NULL, Frame, MessageKey, with_source
 from canshaper.codec.status import StatusCodec
 from canshaper.controller.parameter_sets import profile_by_number
 from canshaper.inputs.value import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
-from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
 from canshaper.shaping.states import Reason
 from canshaper.studio.seen import ACROSS, ALONG, AxisView, Sources, Swing, rounded, sway_of
@@ -63,7 +62,7 @@ class CraneView:
         models = [axis.config.sway for axis in deployment.axes.values()]
         self._swing = Swing((m for m in models if m), deployment.config.still_deg)
         self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
-        self._handlers: dict[Key, list[Any]] = {}
+        self._handlers: dict[MessageKey, list[Any]] = {}
         self._find_messages()
         names = [_source_of(joystick) for joystick in deployment.joysticks.values()]
         for entries in self._handlers.values():
@@ -101,7 +100,7 @@ class CraneView:
                 key = (bus, message.frame_id, message.is_extended_frame)
                 self._on(key, handler, message, message_name)
 
-    def _on(self, key: Key, handler: Any, what: Any, message: str) -> None:
+    def _on(self, key: MessageKey, handler: Any, what: Any, message: str) -> None:
         self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:

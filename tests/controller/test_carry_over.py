@@ -4,7 +4,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.axis_control import AxisControl
-from canshaper.inputs.input import Key
+from canshaper.inputs.input import PartKey
 from canshaper.inputs.value import Following
 from canshaper.shaping.states import State
 from tests.controller.reloaded import reload
@@ -49,7 +49,9 @@ def test_a_part_is_known_by_what_it_is_on_the_machine(rig: Rig) -> None:
     sent = [512, 513, 514, 784, 785, 768, 769, 770]
     senders = [("sender", *here, can_id, False) for can_id in sent]
     valves = {"slew": 512, "near_far": 513, "lift": 514}
-    controls: dict[Key, AxisControl] = {("axis", name): controller.axes[name] for name in valves}
+    controls: dict[PartKey, AxisControl] = {
+        ("axis", name): controller.axes[name] for name in valves
+    }
     for name, can_id in valves.items():
         controls["valve", *here, can_id, False, "Velocity"] = controller.axes[name]
     assert set(parts) == {*inputs, *senders, *controls}

@@ -4,14 +4,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault, MessageKey
 from canshaper.controller.controller import Controller
 from canshaper.inputs.input import Input, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.stops import EmergencyStopInput, EnableGate
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.interface import MessageKey
 from canshaper.shaping.states import CommandInput, Reason
 from canshaper_sim.hand import Hand, Held
 from tests.controller.cab import enable_of, seat

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.codec.frame import MessageKey
 from canshaper.config.bus import J1939, Bus, Canopen, CanopenNode, J1939Name
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import GroupRoute, Key, Role, Route, Routing, build_routing
+from canshaper.machine.routing import GroupRoute, Role, Route, Routing, build_routing
 from tests.rigs.files import CONFIG, machine_file
 
 
@@ -123,7 +124,7 @@ WATCHED = {("crane", 0x710, False), ("crane", 0x090, False)}
     ],
 )
 def test_a_node_of_canopen_sends_its_heartbeat_and_only_the_master_sends_nmt(
-    master: bool, listen_only: bool, sent: set[Key]
+    master: bool, listen_only: bool, sent: set[MessageKey]
 ) -> None:
     routing = nodes_of({"crane": canopen_bus(master=master)}, listen_only=listen_only)
     assert routing.routes == dict.fromkeys(WATCHED, Route(Role.NODE)) | dict.fromkeys(
@@ -219,7 +220,9 @@ def test_groups_of_two_buses_of_j1939_do_not_mix(tmp_path: Path) -> None:
         (("crane", 0x18FF0042, False), True),  # no one knows it
     ],
 )
-def test_a_message_matters_that_is_used_or_that_no_one_knows(key: Key, matters: bool) -> None:
+def test_a_message_matters_that_is_used_or_that_no_one_knows(
+    key: MessageKey, matters: bool
+) -> None:
     known = {(0x110, False), (0x18EE0042, True), (0x18EE0042, False), (0x18FF0042, True)}
     groups = {("crane", 0xEE0000): GroupRoute()}
     routes = {("crane", 0x110, False): Route(Role.SENT)}

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 from rich.text import Text
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import Key
 from canshaper.recording.channels import InputFinder
 from canshaper.recording.listen import AxisStatus, History, HistoryEvent, ReceivedFrame
 
@@ -92,7 +91,7 @@ class Monitor:
         self.history = History(deployment)
         self.events: deque[HistoryEvent] = deque(maxlen=MOST_EVENTS)
         self.others: Counter[str] = Counter()
-        self.messages: dict[Key, MessageRate] = {}
+        self.messages: dict[MessageKey, MessageRate] = {}
         self._finder = InputFinder(deployment.config.buses, deployment.inputs())
         self._buses = {name: MessageRate(name, None) for name in deployment.config.buses}
         self.samples: dict[str, deque[Sample]] = {

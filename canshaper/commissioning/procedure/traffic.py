@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from cantools.database.can import Message
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.layout import Layout
 from canshaper.commissioning import suggest
 from canshaper.commissioning.doctor.joysticks import inputs_of
@@ -19,7 +19,6 @@ from canshaper.errors import IdentificationError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
-from canshaper.machine.routing import Key
 from canshaper.machine.valves import BoundAxis
 from canshaper.recording.channels import InputFinder, joystick_commands, valve_part
 from canshaper.recording.listen import History, ReceivedFrame
@@ -69,7 +68,7 @@ class Traffic:
     """
 
     duration_s: float = 0.0
-    frames: dict[Key, list[float]] = field(default_factory=lambda: defaultdict(list))
+    frames: dict[MessageKey, list[float]] = field(default_factory=lambda: defaultdict(list))
     inputs: dict[str, list[int]] = field(default_factory=dict)
     axes: dict[str, AxisTraffic] = field(default_factory=dict)
     moved: dict[str, list[float]] = field(default_factory=dict)
@@ -87,7 +86,7 @@ class _Reader:
         self.traffic.inputs = {name: [] for name in named}
         self._finder: InputFinder[BoundInput] = InputFinder(deployment.config.buses, named.values())
         self._history = History(deployment)
-        self._valves: dict[Key, list[BoundAxis]] = defaultdict(list)
+        self._valves: dict[MessageKey, list[BoundAxis]] = defaultdict(list)
         for axis in deployment.axes.values():
             self._valves[axis.valve.message.key].append(axis)
         self._candidates = {

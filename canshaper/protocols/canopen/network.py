@@ -15,17 +15,18 @@ from canshaper.codec.frame import (
     STATE_BITS,
     Frame,
     FrameFault,
+    MessageKey,
     NodeState,
     ValveState,
     service_of,
 )
 from canshaper.codec.message import Sender
 from canshaper.config.schema import StatusWord
-from canshaper.inputs.input import GOOD, Input, Key, MessageInput, Part, Raw
+from canshaper.inputs.input import GOOD, Input, MessageInput, Part, PartKey, Raw
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import Bound, BoundInput
 from canshaper.protocols.canopen.nodes import CanopenBus, NodeEvent, RemoteNode
-from canshaper.protocols.interface import BusProtocol, DrivenAxis, MessageKey
+from canshaper.protocols.interface import BusProtocol, DrivenAxis
 from canshaper.shaping.states import Reason
 
 STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIVE)
@@ -206,7 +207,7 @@ class CanopenNetwork(BusProtocol):
         for control in self.controls.values():
             control.hold()
 
-    def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
+    def parts(self, places: Mapping[str, PartKey]) -> Iterator[tuple[PartKey, Part]]:
         """Yield the parts that a reload carries over: our heartbeats."""
         for bus, nodes in self.nodes.items():
             yield ("canopen", *places[bus], nodes.own), nodes

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK, Frame
+from canshaper.codec.frame import EFF_FLAG, EFF_MASK, SFF_MASK, Frame, MessageKey
 from canshaper.codec.rewrite import RewritingSender
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.interface import BusProtocol, DrivenAxis, MessageKey
+from canshaper.protocols.interface import BusProtocol, DrivenAxis
 from canshaper.shaping.states import MOVING, State
 
 # Cycles without a frame of the joystick after which a trip does not wait for the next one.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from canshaper.codec.frame import CLAIMED, Frame, group_of, name_bytes, pgn_of
 from canshaper.config.bus import J1939
-from canshaper.inputs.input import Key, MessageInput, Part
+from canshaper.inputs.input import MessageInput, Part, PartKey
 from canshaper.inputs.value import Following
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -149,7 +149,7 @@ class J1939Network(BusProtocol):
             if bus in (None, where):
                 one.invalidate()
 
-    def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
+    def parts(self, places: Mapping[str, PartKey]) -> Iterator[tuple[PartKey, Part]]:
         """Yield (key, part) of inputs from any address, nodes and faults, for a reload."""
         for (bus, group), (source, received) in self._any.items():
             yield ("source", *places[bus], group), source

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from canshaper.config.adjust import Key, adjusted
+from canshaper.config.adjust import AxisKey, adjusted
 from canshaper.config.filters import SecondMode
 from canshaper.design.tuning.evaluate import Machine
 from canshaper.design.tuning.modes import second_mode
@@ -256,7 +256,7 @@ def test_another_period_stretches_the_taps_as_long_as_the_second_mode_is_covered
     config = designed(file, "--second", option()).config
     assert config.sway is not None
     assert config.sway.period_s is not None
-    key = Key("near_far", "sway", "period_s")
+    key = AxisKey("near_far", "sway", "period_s")
     longer = adjusted(config, {key: 1.08 * config.sway.period_s}, config)
     assert len(longer.filter.parameters()["taps"]) > len(config.filter.parameters()["taps"])
     for factor in (0.85, 1.15):
