@@ -22,6 +22,7 @@ from canshaper.config.desk import MEASURES
 from canshaper.config.inputs import PROFILES
 from canshaper.config.section import Section
 from canshaper.controller.valve_messages import Counters
+from canshaper.recording.log import FORMATS
 from canshaper.report.shift import FIGURES
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
@@ -231,6 +232,17 @@ def profile_rows() -> Iterator[str]:
         yield f"| `{name}` | {needs} | {one.header} | {one.counter} | {one.crc} |"
 
 
+def log_rows() -> Iterator[str]:
+    """Table of the formats of a log; formats of one kind in one row."""
+    yield "| suffix | written by |"
+    yield "|---|---|"
+    suffixes: dict[str, list[str]] = {}
+    for suffix, one in FORMATS.items():
+        suffixes.setdefault(one.says, []).append(f"`{suffix}`")
+    for says, names in suffixes.items():
+        yield f"| {', '.join(names)} | {says} |"
+
+
 def step_rows() -> Iterator[str]:
     """Table of the steps of a commissioning."""
     yield "| step | what it does | writes | open again after |"
@@ -257,6 +269,7 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "rings": ring_rows,
     "trust": trust_rows,
     "shipped": shipped_rows,
+    "logs": log_rows,
 }
 
 

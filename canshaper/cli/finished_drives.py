@@ -21,10 +21,10 @@ BUNDLE = ".zip"
 
 def is_drive(file: str) -> bool:
     """Return whether the suffix is that of a log, a black box or a recording."""
-    from canshaper.recording.log import READERS
+    from canshaper.recording.log import FORMATS
 
     suffix = Path(file.lower().removesuffix(".gz")).suffix
-    return suffix == BUNDLE or suffix in READERS
+    return suffix == BUNDLE or suffix in FORMATS
 
 
 def opened_drives(

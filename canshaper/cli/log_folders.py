@@ -16,7 +16,7 @@ from canshaper.campaign.engine import Engine
 from canshaper.cli.common import loader, os_errors
 from canshaper.cli.results import Results
 from canshaper.errors import CanshaperError, UsageError
-from canshaper.recording.log import READERS, LogFile
+from canshaper.recording.log import FORMATS, LogFile
 from canshaper.recording.shift import day_of
 from canshaper.report.console import NOTHING, new_table, progress_bar
 
@@ -44,7 +44,7 @@ class Log:
 
 def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
     """Return (machine, path) of every log or bundle below a folder, sorted by name."""
-    known = {*READERS, SUFFIX, *bundles} - {".txt"}  # most of them are notes
+    known = {*FORMATS, SUFFIX, *bundles} - {".txt"}  # most of them are notes
     logs = [
         path
         for path in sorted(folder.rglob("*"))

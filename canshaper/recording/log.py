@@ -1,4 +1,4 @@
-"""Reader of a log of CAN frames, one frame at a time, in the formats of ``READERS``, also gzipped.
+"""Reader of a log of CAN frames, one frame at a time, in the formats of ``FORMATS``, also gzipped.
 
 A million lines take no more memory than a hundred.
 """
@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from io import BufferedReader, RawIOBase
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from canshaper.config.source import encoding_of
 from canshaper.errors import CutOffError, LogError
@@ -19,20 +19,48 @@ from canshaper.recording.channels import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame"]
 
-READERS: dict[str, Callable[[BufferedReader, Place], Iterator[TimedFrame]]] = {
-    ".log": candump.log,
-    ".asc": asc.asc,
-    ".blf": captures.blf,
-    ".csv": tables.csv,
-    ".db": binary.database,
-    ".mcap": binary.mcap,
-    ".mf4": binary.mf4,
-    ".trc": asc.trc,
-    ".txt": candump.kvaser,
-    ".pcap": captures.pcap,
-    ".pcapng": captures.pcap,
+
+class Format(NamedTuple):
+    """One format of a log.
+
+    Attributes:
+        read: yields the frames of an open log; the place counts its lines or frames.
+        says: what writes it, and its channels, in Markdown.
+        text: whether the log is text, of lines.
+        packs: whether the log may be packed with gzip.
+    """
+
+    read: Callable[[BufferedReader, Place], Iterator[TimedFrame]]
+    says: str
+    text: bool = True
+    packs: bool = True
+
+
+LOG_SAYS = "`candump -L`, candump's screen with times (`-t d` too), python-can's logger, BUSMASTER"
+CSV_SAYS = (
+    "python-can, without channels; SavvyCAN (GVRET), buses from 0; CANedge, Kvaser, Vector;"
+    " also from Excel"
+)
+PCAP_SAYS = "tcpdump or Wireshark at CAN interfaces, not at `any`"
+FORMATS = {
+    ".log": Format(candump.log, LOG_SAYS),
+    ".asc": Format(asc.asc, "Vector, channels from 1"),
+    ".blf": Format(captures.blf, "Vector, channels from 1", text=False),
+    ".csv": Format(tables.csv, CSV_SAYS),
+    ".db": Format(
+        binary.database,
+        "python-can's SQLite database, without channels; not packed",
+        text=False,
+        packs=False,
+    ),
+    ".mcap": Format(binary.mcap, "[canshaper](#for-other-programs)", text=False),
+    ".mf4": Format(binary.mf4, "ASAM MDF 4 of a bus logger", text=False),
+    ".trc": Format(asc.trc, "PEAK, versions 1.0 to 2.1"),
+    ".txt": Format(candump.kvaser, "Kvaser"),
+    ".pcap": Format(captures.pcap, PCAP_SAYS, text=False),
+    ".pcapng": Format(captures.pcap, PCAP_SAYS, text=False),
 }
-BINARY = frozenset((".blf", ".db", ".mcap", ".mf4", ".pcap", ".pcapng"))
+"""The formats of a log, by the suffix of its file."""
 # Two sockets of one logger are not read in the order in which their frames came.
 OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.
@@ -98,7 +126,8 @@ class LogFile:
     def _frames(self, place: Place) -> Iterator[TimedFrame]:
         """Yield the frames of the log; their times never go back."""
         packed, suffix = _format(place)
-        place.unit = "frame" if suffix in BINARY else "line"
+        form = FORMATS[suffix]
+        place.unit = "line" if form.text else "frame"
         until_progress = 1
         with self._path.open("rb", buffering=0) as raw:
             size = raw.seek(0, 2)
@@ -107,11 +136,11 @@ class LogFile:
             if packed:
                 file = BufferedReader(_Unpacked(file), BUFFER_BYTES)
             # PowerShell writes UTF-16 with ">".
-            if suffix not in BINARY and (encoding := encoding_of(file.peek(4)[:4])):
+            if form.text and (encoding := encoding_of(file.peek(4)[:4])):
                 file = BufferedReader(_Utf8(file, encoding), BUFFER_BYTES)
             last_ns: int | None = None
             latest_ns = 0
-            for frame in READERS[suffix](file, place):
+            for frame in form.read(file, place):
                 time_ns = frame[0]
                 if last_ns is not None and last_ns <= time_ns <= latest_ns:
                     last_ns = time_ns
@@ -214,8 +243,9 @@ def _format(place: Place) -> tuple[bool, str]:
     packed = suffixes[-1:] == [".gz"]
     suffix = "".join(suffixes[:-1] if packed else suffixes)
     suffix = f".{suffix.rpartition('.')[2]}"
-    if suffix not in READERS or (packed and suffix == ".db"):
-        known = ", ".join(READERS)
+    form = FORMATS.get(suffix)
+    if form is None or (packed and not form.packs):
+        known = ", ".join(FORMATS)
         got = repr(suffix) if suffix != "." else "none"
         expected = f"the suffix {known}, each also with .gz behind"
         raise LogError(f"{place.path}: expected {expected}, got {got}")

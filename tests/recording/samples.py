@@ -17,7 +17,7 @@ import can
 
 from canshaper.errors import LogError
 from canshaper.recording.channels import fits
-from canshaper.recording.log import READERS, LogFile
+from canshaper.recording.log import FORMATS, LogFile
 
 Row = tuple[int, bool, bytes]
 Timed = tuple[Decimal, Row]
@@ -34,7 +34,7 @@ def samples(folders: Sequence[Path]) -> Iterator[Path]:
     for folder in folders:
         for path in sorted(folder.rglob("*")):
             name = path.name.lower().removesuffix(".gz")
-            if path.is_file() and Path(name).suffix in READERS:
+            if path.is_file() and Path(name).suffix in FORMATS:
                 yield path
 
 

@@ -8,7 +8,7 @@ import can
 import pytest
 
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording.log import READERS, LogFile
+from canshaper.recording.log import FORMATS, LogFile
 from tests.recording.lines import FRAMES, HEADER, LINES, error_of, log, prefix
 from tests.recording.writing import messages, written
 
@@ -93,7 +93,7 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         (
             "a.xyz",
             "",
-            f"expected the suffix {', '.join(READERS)}, each also with .gz behind, got '.xyz'",
+            f"expected the suffix {', '.join(FORMATS)}, each also with .gz behind, got '.xyz'",
         ),
         ("drive", "", "each also with .gz behind, got none"),
     ],
