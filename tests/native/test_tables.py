@@ -1,5 +1,6 @@
 """Keys for which C has no part are refused by name; numbers are exact to the last bit."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -10,11 +11,12 @@ from canshaper import Fir
 from canshaper.config.limits import Limits
 from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
-from canshaper.native.library import sizes_source, tables_source
+from canshaper.native.library import C_FILES, sizes_source, tables_source
 from canshaper.native.tables import tables
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Shaper, ShaperKind
 from canshaper.shaping.shapers.limit_aware import LimitAware
+from canshaper.shaping.states import Reason, State
 from tests.native.machines import SHIPPED
 from tests.rigs.files import CONFIG, Machine, read
 
@@ -120,3 +122,14 @@ def test_no_line_of_the_source_is_code() -> None:
     for line in source.splitlines():
         starts = ("const cs_config ", "#", "/*", "    {")
         assert not line or line.startswith(starts), line
+
+
+def test_states_and_reasons_of_the_c_have_the_numbers_of_the_program() -> None:
+    header = (C_FILES / "src" / "canshaper.h").read_text(encoding="utf-8")
+    states, reasons = re.findall(r"^enum \{(.*?)\};", header, re.M | re.S)[:2]
+    assert re.findall(r"CS_(\w+)", states) == [state.name for state in State]
+    numbers = dict(re.findall(r"CS_(\w+) = (\d+)", reasons))
+    assert numbers
+    assert {name: int(number) for name, number in numbers.items()} == {
+        name: int(Reason[name]) for name in numbers
+    }
