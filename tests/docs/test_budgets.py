@@ -44,7 +44,7 @@ BUDGET = {
     "docs/machines.md": 810,
     "docs/monitor.md": 260,
     "docs/realtime.md": 350,
-    "docs/replay.md": 720,
+    "docs/replay.md": 650,
     "docs/safety.md": 2290,
     "docs/sensor.md": 800,
     "docs/service.md": 680,
@@ -59,12 +59,12 @@ BUDGET = {
     "studies/README.md": 360,
 }
 
-# Lines of Python, and why so many.
+# Lines of Python with room for small additions, and why so many.
 LINES = {
-    "canshaper/gate": (2_118, "read in a day by someone who has never seen it"),
-    "canshaper/shaping": (4_922, "the method: filters, axis, motion, ends, observer of the sway"),
-    "canshaper": (66_491, "a new ability takes the room of an old one"),
-    "tests": (99_512, "one level for each behaviour"),
+    "canshaper/gate": (2_200, "read in a day by someone who has never seen it"),
+    "canshaper/shaping": (5_000, "the method: filters, axis, motion, ends, observer of the sway"),
+    "canshaper": (67_000, "a new ability takes the room of an old one"),
+    "tests": (100_000, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (332, "one that only hands on is joined to its reader")}
