@@ -16,7 +16,7 @@ ANSWER_S = 5.0
 
 
 def table(path: Path) -> dict[str, dict[str, float]]:
-    """Return the adjustable numbers by key, with ``now``, ``file``, ``low`` and ``high``.
+    """Return a daemon's adjustable numbers by key, each with ``now``, ``file``, ``low``, ``high``.
 
     Raises:
         ControlError: no daemon answers.
@@ -72,7 +72,7 @@ def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
 
     Args:
         path: its control socket.
-        on_wait: called again and again meanwhile; an error that it raises ends the wait.
+        on_wait: called between two questions to sleep; an error that it raises ends the wait.
 
     Returns:
         The folder where it was written.

@@ -32,7 +32,7 @@ MEASURE = "measure it (canshaper commission), or read it in a manual; then take 
 
 
 def assumptions(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Yield the numbers that no one has measured or typed, by axis: where, and what to do."""
+    """Yield wrong keys of ``assumed``, and by axis the guessed numbers: where, and what to do."""
     known = {key_path(place): value for place, value in _numbers(config)}
     for i, key in enumerate(config.assumed):
         if key not in known:
@@ -46,7 +46,7 @@ def assumptions(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
 
 
 def confirmed(path: Path, keys: Iterable[str]) -> list[Change]:
-    """Return the change of ``assumed`` in the file: these numbers are measured or typed now.
+    """Return the change, if any, that takes numbers now measured or typed out of ``assumed``.
 
     Raises:
         ConfigError: the file cannot be read.
@@ -224,7 +224,7 @@ _FRAMES = 5000
 def is_simulated(log: Path, messages: Messages) -> bool:
     """Return whether a log is of a virtual bus, or has messages of the simulated crane.
 
-    A table is of a machine.
+    Its first ``_FRAMES`` frames are looked at. A table is of a machine.
 
     Raises:
         LogError: the log cannot be read.

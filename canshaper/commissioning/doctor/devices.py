@@ -43,7 +43,7 @@ class Link:
         queue: length of its transmit queue, frames.
         mtu: bytes of the kernel's frames that it carries: 16 of classical CAN, 72 of CAN FD.
         data: details of a controller, in the words of ``ip``; empty where there are none.
-        counts: its errors since it was set up first.
+        counts: its errors since it was plugged in, by the names of ``ip``.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Link:
     counts: dict[str, int]
 
     def rate(self, timing: str = "bittiming") -> int | None:
-        """Return the bit rate of a timing, bit/s; an adapter without timings reports its rate."""
+        """Return the rate of a timing, bit/s, or of an adapter without timings; None if unknown."""
         rate = self.data.get(timing, {}).get("bitrate", self.data.get(f"{timing}_bitrate"))
         return int(rate) if rate else None
 
@@ -74,7 +74,7 @@ def read_link(name: str, root: Path = Path("/")) -> Link | None:
 
 
 def parse_ip(text: str) -> Link | None:
-    """Return the interface in the output of ``ip -details -statistics -json link show``."""
+    """Return what ``ip -details -statistics -json link show`` printed; None for no interface."""
     try:
         entries = [entry for entry in json.loads(text) if entry.get("ifname")]
     except ValueError:  # an ip without -json
@@ -97,7 +97,7 @@ def parse_ip(text: str) -> Link | None:
 
 
 def read_sys(name: str, root: Path) -> Link | None:
-    """Return an interface as /sys/class/net shows it, without details of its controller."""
+    """Return an interface as /sys/class/net shows it, without its controller; None for none."""
     directory = root / "sys/class/net" / name
     try:
         texts = {f: (directory / f).read_text().strip() for f in SYS_FILES}
@@ -132,7 +132,7 @@ def device_findings(
         name: of the bus in the deployment file.
         bus: its section.
         root: of the file system.
-        query_kernel: for kind and bit rates of the interface with an index.
+        query_kernel: asks for kind and bit rates of the interface with an index.
     """
     subject = f"{bus.channel} device"
     try:
@@ -154,7 +154,7 @@ def device_findings(
 
 
 def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
-    """Return lines to paste: ``match`` for the deployment file, a name for networkd and udev.
+    """Return lines to paste: ``match`` for the file; with serial or path, rules to name it.
 
     Args:
         name: of the bus in the deployment file.

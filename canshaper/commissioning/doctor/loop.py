@@ -71,8 +71,8 @@ class Loop:
 
     Args:
         deployment: what is run.
-        sockets: one end of a bus, by its name.
-        seconds: how long.
+        sockets: the loop's end of the socket pair of each bus, by its name.
+        seconds: how long, from the first frame on.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Loop:
         self._moved: set[str] = set()
 
     def run(self) -> None:
-        """Run as the daemon does, from the first frame of a joystick on."""
+        """Run as the daemon does, from the first frame of a joystick on; then close the buses."""
         self._collector.freeze()
         say_ready()
         select.select(list(self._ports.values()), [], [])
@@ -138,7 +138,7 @@ class Loop:
         self._collector.pause(now_ns)
 
     def record(self) -> dict[str, Any]:
-        """Return the record of the run: the fields of ``Record``."""
+        """Return the record of the run, of which ``run_of`` makes a ``Run``; times in ns."""
         return {
             "late_ns": list(self._late),
             "began_ns": list(self._began),

@@ -141,7 +141,7 @@ def governor(root: Path) -> Finding:
 
 
 def idle_states(root: Path, tick_ms: int) -> Finding:
-    """Check how long the deepest sleep of a processor takes to wake up from."""
+    """Check which part of a tick the deepest sleep of a processor takes to wake up from."""
     deepest_us, name = 0, ""
     for state in (root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpuidle/state*"):
         latency = _read(state / "latency")
@@ -224,7 +224,7 @@ def processors(root: Path, number: int) -> Finding:
 
 
 def others(load: float, number: int) -> Finding:
-    """Check which programs ran before the first run: the run called idle includes them.
+    """Check how many processes wanted to run before the first run, whose figures include them.
 
     Args:
         load: processes that ran or waited for a processor, mean of a minute.

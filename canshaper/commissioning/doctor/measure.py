@@ -56,12 +56,12 @@ def measure(
 
     Args:
         deployment: what is run.
-        seconds: how long.
+        seconds: how long it runs.
         on_progress: called with the seconds that have passed.
         load: keep the PC busy meanwhile.
 
     Raises:
-        MeasurementError: a process failed.
+        MeasurementError: a process failed, or did not end in time.
     """
     with Children() as children, ExitStack() as ends:
         loops, joysticks = {}, {}

@@ -27,7 +27,7 @@ class Keys:
     Attributes:
         paused: whether the picture stands still; listening goes on.
         axis: the only one that is shown; None for all.
-        ended: whether it is enough.
+        ended: whether the person ends the monitor.
     """
 
     def __init__(self, axes: Sequence[str]) -> None:
@@ -37,7 +37,7 @@ class Keys:
         self.ended = False
 
     def press(self, pressed: str) -> None:
-        """Take keys, in order; others do nothing."""
+        """Take keys: p or space pauses, a shows the next axis, q ends; others do nothing."""
         for key in pressed:
             if key in "p ":
                 self.paused = not self.paused

@@ -115,7 +115,7 @@ class Eds:
         return ConfigError([Problem(str(self.path), line, "", f"{text}, got {got!r}")])
 
     def _check(self, section: str) -> None:
-        """Check what canopen would report with an error that names no section."""
+        """Raise ConfigError for what canopen would report without its section."""
         match = _OBJECT.fullmatch(section)
         assert match
         options = self._file[section]
@@ -140,7 +140,7 @@ class Eds:
 
 
 def _canonical(file: configparser.RawConfigParser) -> configparser.RawConfigParser:
-    """Return the file with sections and keys as the standard writes them, without empty ones."""
+    """Return the file with sections and keys in the standard's spelling, without empty numbers."""
     result = configparser.RawConfigParser()
     result.optionxform = str  # type: ignore[method-assign,assignment]
     for section in file.sections():

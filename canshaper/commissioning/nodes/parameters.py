@@ -76,7 +76,7 @@ def heartbeat_ms(node: Node) -> int | None:
 
 
 def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> list[Parameter]:
-    """Return the parameters to set in a node, in this order.
+    """Return the parameters that a node has otherwise, to be set in this order, stored last.
 
     Args:
         name: its name.
@@ -138,7 +138,7 @@ def _of_pdo(node: Node, pdo: Pdo, use: MessageTiming) -> Iterator[_Setting]:
 
 
 def write(bus: Bus, nodes: Mapping[str, Node], parameters: Sequence[Parameter]) -> Iterator[str]:
-    """Set parameters one after the other, each read before and after; yield what was done.
+    """Set parameters that differ, one after the other, and read them again; yield what was done.
 
     Raises:
         BusError: the bus cannot be opened.

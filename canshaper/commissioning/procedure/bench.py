@@ -105,7 +105,7 @@ class Mode(Enum):
     """Who moves the valves while a step listens."""
 
     LISTEN = "listen"
-    """The person who moves them, without us."""
+    """The person, without us."""
     DRY = "dry"
     """The person moves them without us; the daemon computes, and sends no valve frame."""
     RAW = "raw"
@@ -166,7 +166,7 @@ class Bench(Protocol):
         """
 
     def raw_mode(self, step: str) -> Mode:
-        """Return who moves the valves without filters before the first motion."""
+        """Return who moves the valves, without filters, in a step; at a machine ask the person."""
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:
         """Drive an axis through its ramp; its valve is neutral afterwards, however it ends.
@@ -209,7 +209,7 @@ class Simulated:
         self.changes = changes
 
     def parameters(self, deployment: Deployment) -> CraneParameters:
-        """Return the crane of this file."""
+        """Return the parameters of the simulated crane for this file, with ``changes``."""
         return changed_parameters(self.changes, deployment)
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:

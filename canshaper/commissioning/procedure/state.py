@@ -90,7 +90,7 @@ def now() -> str:
 
 
 def stamped(record: Record) -> Record:
-    """Return the record with the time and the program version of now."""
+    """Give the record the time and the program version of now; return it."""
     record.at, record.version = now(), canshaper.__version__
     return record
 

@@ -35,7 +35,7 @@ EVENTS = ("joystick released", "joystick reversed", "joystick lost", "enable los
 
 
 def check_file(context: Context) -> Outcome:
-    """Check the whole file, and propose reduced speed before the first motion."""
+    """Check the whole file; propose reduced speed before the first motion, and guesses to allow."""
     deployment = context.deployment
     outcome = Outcome()
     for name, bus in deployment.config.buses.items():
@@ -124,7 +124,7 @@ HAND_TESTS = (
 
 
 def write_report(context: Context) -> Outcome:
-    """Write what all steps have shown into one file."""
+    """Write what all steps have shown into report.html; print what keeps it from being signed."""
     path = context.folder / "report.html"
     steps = {name: one for name, one in context.state.steps.items() if name != NAME}
     path.write_text(document(context.deployment, context.state, steps, context.folder), "utf-8")
@@ -146,7 +146,7 @@ def write_report(context: Context) -> Outcome:
 
 
 def document(deployment: Deployment, state: State, steps: dict[str, Record], folder: Path) -> str:
-    """Return the whole report.
+    """Return the whole report as HTML.
 
     Args:
         deployment: as it is now.
