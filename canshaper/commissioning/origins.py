@@ -57,7 +57,7 @@ def confirmed(path: Path, keys: Iterable[str]) -> list[Change]:
 
 
 def write_numbers(path: Path, values: Mapping[str, float]) -> None:
-    """Write numbers that a person has set into a deployment file; see ``change``.
+    """Write numbers that a person has set into a deployment file, by key; none stays assumed.
 
     Raises:
         ConfigError: the file cannot be changed.

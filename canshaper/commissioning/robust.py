@@ -52,7 +52,7 @@ class RobustDesign:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Verdict on the shaper over its lengths; it names a longer one that is good."""
+        """Verdict on the shaper over its lengths; it names a longer shaper that is good, if any."""
         task, shaper = self.task, self.shaper
         setup = task.mode, task.tick_s, task.in_file(shaper), task.machine_of(shaper)
         verdict = judge(*setup, task.range_pct)
@@ -110,7 +110,7 @@ def design_robust(
         lengths_m: instead: shortest and longest pendulum that it covers; for an axis that follows
             its rope the ends of that, of which it is designed for the shortest.
         duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
-        residual_pct: instead: the shortest that leaves at most this part of the swing.
+        residual_pct: instead: part of the swing that the shortest such shaper may leave.
         second: a second mode as the option --second has it; None for that of the filter in the
             file.
         first: taps with which it begins, where it has a duration.

@@ -285,7 +285,7 @@ def needed_s(
 def _way(
     steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float
 ) -> tuple[float, int]:
-    """Return the travel in the old direction, s of full speed, and the ticks until its end."""
+    """Return the travel in the old direction, s of full speed, and how many ticks that takes."""
     axis = copy.deepcopy(steady)
     way_s = most_s = 0.0
     last = 0

@@ -258,7 +258,7 @@ def is_status(message: Message) -> bool:
 
 
 def status_of(messages: Sequence[Message], axis: str) -> Message | None:
-    """Return the status message of an axis, by its name; None for none."""
+    """Return the cyclic status message that is named like an axis; None for none."""
     candidates = [m for m in messages if is_status(m) and m.cycle_time]
     likely = max(candidates, key=lambda m: likeness(m.name, axis), default=None)
     return likely if likely and likeness(likely.name, axis) >= LIKELY else None

@@ -42,7 +42,7 @@ class TunedDesign:
         tuning: the poles that answer it.
         setting: the poles with the digits of a file, and what they do.
         before: the setting in the file, where its filter is a G_FF.
-        tail: tail that it needs, and the swing that is left with it; see ``deploy.tail_for``.
+        tail: tail that it needs, s, and part of the swing that it leaves; None for none.
         verdict: whether it damps.
         objective: keys for the file that tune it again; None for the manual rule.
         choices: settings that a preference has chosen from; none without a preference.

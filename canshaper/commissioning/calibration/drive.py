@@ -211,7 +211,7 @@ class CalibrationDrive:
         self.moments.append(moment)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return a neutral frame for every valve."""
+        """Return the neutral frames to send last, without those that the gate refuses."""
         return self._gated.neutral_frames()
 
     def check_ended(self) -> None:

@@ -178,7 +178,7 @@ def _opening(
 
 
 def _line(samples: Sequence[Sample]) -> tuple[float, float]:
-    """Return command at speed zero and slope of the best line; of one that falls slope 0."""
+    """Return command at speed zero and slope of the best line; slope 0 where it does not rise."""
     n = len(samples)
     c, s = sum(x.command for x in samples) / n, sum(x.speed for x in samples) / n
     spread = math.fsum((x.command - c) ** 2 for x in samples)

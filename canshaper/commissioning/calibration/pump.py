@@ -38,7 +38,7 @@ ALIKE = 0.1
 STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
 
 Moment = Sequence[float]
-"""Time in s, rising; then of each of two axes its demand, part of full speed, and its speed."""
+"""Time in s, rising; then of each axis its demand, part of full speed, and its speed."""
 
 Drives = Sequence[Sequence[Moment]]
 Mean = tuple[float, float]

@@ -154,7 +154,7 @@ def device_findings(
 
 
 def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
-    """Return lines to paste: ``match`` for the file; with serial or path, rules to name it.
+    """Return lines to paste: ``match`` for the file; with serial or path files that name it too.
 
     Args:
         name: of the bus in the deployment file.

@@ -95,7 +95,7 @@ def ready(process: "subprocess.Popen[str]") -> None:
 
 
 def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
-    """Wait for the end of a child, None without a limit, and return its output.
+    """Return the output of a child at its end; wait for that so long, or for ever (None).
 
     Raises:
         MeasurementError: it failed.

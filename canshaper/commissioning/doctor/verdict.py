@@ -116,7 +116,7 @@ def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Find
 
 
 def waiting(deployment: Deployment) -> list[Finding]:
-    """Note how long joystick frames wait for a tick that could follow them, or does."""
+    """Note how long joystick frames wait for a tick that could follow them, or that it does."""
     config = deployment.config
     subject = "wait for the tick"
     if config.tick:

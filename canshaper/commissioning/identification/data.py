@@ -161,7 +161,7 @@ def stopwatch(
 
 
 def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> SwingFinding:
-    """Return the finding of the numbers of ``stopwatch``, in its order, by option.
+    """Return the finding of a stopwatch: the arguments of ``stopwatch``, in order, by option.
 
     Raises:
         UsageError: one is missing, or there is a log.
@@ -175,7 +175,7 @@ def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str
 
 
 def axis_named(axis: str | None, deployment: Deployment | None) -> str:
-    """Return --axis, which has to be one of the deployment, else UsageError; without it any."""
+    """Return an axis of the deployment, else UsageError; without deployment any, or "swing"."""
     if deployment is None:
         return axis or UNNAMED
     if axis not in deployment.axes:

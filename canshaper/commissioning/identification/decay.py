@@ -81,7 +81,7 @@ class DecayProblem:
         return np.concatenate(parts)
 
     def solve(self, x: Sequence[float], *, roughly: bool = False) -> Array:
-        """Fit the parameters from a start, and amplitudes and weights; ``roughly``: to 1e-4."""
+        """Fit parameters from a start, and set amplitudes and weights; ``roughly``: to 1e-4."""
         omega = float(x[0])
         low = np.array([0.6 * omega, -0.2 * omega, -np.inf])[: len(x)]
         high = np.array([1.6 * omega, omega, np.inf])[: len(x)]
@@ -235,7 +235,7 @@ def swing_values(omega: float, sigma: float) -> tuple[float, float]:
 
 
 def deviations(x: Array, covariance: Array) -> tuple[float, float]:
-    """Return the standard deviations of period (s) and damping ratio; see ``DecayProblem``."""
+    """Return the deviations of period (s) and damping ratio, by frequency, decay, covariance."""
     omega, sigma = float(x[0]), float(x[1])
     cube = math.hypot(omega, sigma) ** 3
     slopes = np.array([[-2.0 * math.pi / omega**2, 0.0], [-sigma * omega / cube, omega**2 / cube]])
@@ -244,7 +244,7 @@ def deviations(x: Array, covariance: Array) -> tuple[float, float]:
 
 
 def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
-    """Return the deviation of the mean of (value, deviation) as they differ; 0 for one."""
+    """Return the deviation of the mean of (value, deviation) by how values differ; 0 for one."""
     weights = [1.0 / max(deviation, 1e-9) ** 2 for _, deviation in alone]
     terms = [(w * (value - common)) ** 2 for w, (value, _) in zip(weights, alone, strict=True)]
     count = len(alone)

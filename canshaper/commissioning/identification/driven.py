@@ -85,7 +85,7 @@ class DrivenFit:
 
 
 def stretches(series: Series, period: float) -> list[Driven]:
-    """Return the stretches with commands, some periods before and after them; none with a gap."""
+    """Return the driven stretches with some periods around them; those with gaps are left out."""
     command = series.command
     if command is None or not len(command.time_s):
         return []

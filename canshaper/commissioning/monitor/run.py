@@ -39,7 +39,7 @@ class Ear:
         self._again_s = 0.0
 
     def listen(self, timeout_s: float) -> None:
-        """Receive waiting frames; wait for no longer than the timeout."""
+        """Receive waiting frames, or try a lost bus again; wait for no longer than the timeout."""
         if self._listener is None:
             self._reopen(timeout_s)
             return
@@ -80,7 +80,7 @@ def run_live(
     Args:
         deployment: the machine.
         console: the terminal.
-        rate_hz: how often.
+        rate_hz: how often it is drawn.
         going: whether to go on.
 
     Raises:

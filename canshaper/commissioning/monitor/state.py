@@ -62,7 +62,7 @@ class MessageRate:
         return len(self.times) * 1e9 / WINDOW_NS
 
     def silent_s(self, now_ns: int) -> float | None:
-        """Return for how long the message is missing; None where it is not, or never came."""
+        """Return for how long the message is missing, s; None where it is not, or never came."""
         if self.last_ns is None:
             return None
         limit_ns = LATE_NS
@@ -112,7 +112,7 @@ class Monitor:
             self.messages.setdefault(message.key, MessageRate(dbc.name, dbc.cycle_time))
 
     def receive(self, frame: ReceivedFrame) -> None:
-        """Take a frame into rates and, by its kind, counts, history, samples and events."""
+        """Take a frame into rates, history, samples and events; one of another kind is counted."""
         self._buses[frame.bus].received(frame.time_ns)
         if frame.kind:
             self.others[frame.kind] += 1

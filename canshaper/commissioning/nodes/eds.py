@@ -107,7 +107,7 @@ class Eds:
         return ConfigError([self.problem(section, text)])
 
     def _not_one(self, error: configparser.Error) -> ConfigError:
-        """Return why the file has no sections, with the line."""
+        """Return the error of a file that is not made of sections, with the line."""
         several = getattr(error, "errors", ())  # of a ParsingError, with their lines
         line = several[0][0] if several else getattr(error, "lineno", None)
         got = self._text.splitlines()[line - 1].strip()[:40] if line else "another"

@@ -76,7 +76,7 @@ def heartbeat_ms(node: Node) -> int | None:
 
 
 def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> list[Parameter]:
-    """Return the parameters that a node has otherwise, to be set in this order, stored last.
+    """Return the parameters to change in a node, in this order; last one that stores them.
 
     Args:
         name: its name.

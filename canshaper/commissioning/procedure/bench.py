@@ -163,6 +163,7 @@ class Bench(Protocol):
         Raises:
             BusError: a bus cannot be opened.
             OSError: the log cannot be written.
+            UsageError: the daemon ended by itself.
         """
 
     def raw_mode(self, step: str) -> Mode:

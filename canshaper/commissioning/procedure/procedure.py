@@ -154,7 +154,7 @@ class Procedure:
         return outcome
 
     def accept(self, outcome: Outcome) -> None:
-        """Write what a step proposes; it is done. If that changes the file, users are open again.
+        """Write what a step proposes; it is done. A change of the file opens the steps that use it.
 
         Raises:
             UsageError: the outcome has problems, or the file was changed meanwhile; the step stays

@@ -28,7 +28,7 @@ DRIVEN = {State.ACTIVE.name, State.BYPASS_ON.name}
 
 
 def ends(axes: Sequence[str], level: float) -> tuple[Stroke, ...]:
-    """Return strokes of every joystick to a part of full and back beyond, one after the other."""
+    """Return strokes of each joystick to +``level``, part of full, then to -``level``, in turn."""
     strokes, begin_s = [], FIRST_S
     for name in axes:
         for sign in (1.0, -1.0):
@@ -224,7 +224,7 @@ def _follows(axis: AxisTraffic) -> bool:
 
 
 def _releases(axis: AxisTraffic) -> list[float]:
-    """Return s from each release of the enable in motion to a neutral valve; infinite for never."""
+    """Return the times, s, from each release of enable in motion to neutral; infinite for never."""
     (time_s, valve), (at_s, enabled) = axis.valve.arrays(), axis.enabled.arrays()
     times_s = []
     for released_s in at_s[1:][(enabled[:-1] > 0.0) & (enabled[1:] == 0.0)]:
