@@ -120,7 +120,7 @@ def labels(objects: Sequence[Mapped]) -> list[str]:
     names: list[str] = []
     for number, (short, long) in enumerate(zip(own, longer, strict=True), 1):
         label = short if once[short] == 1 else long
-        unique = once[short] == 1 or once_longer[long] == 1
+        unique = once[short] == 1 or (once_longer[long] == 1 and once[long] != 1)
         names.append(label if unique else f"{label[: _LETTERS - 3]}_{number}")
     return names
 
