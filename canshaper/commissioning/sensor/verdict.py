@@ -12,7 +12,7 @@ from canshaper.commissioning.identification.driven import Driven, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
 from canshaper.commissioning.identification.swing import clipped
 from canshaper.commissioning.identification.verdict import AxisFinding
-from canshaper.commissioning.origins import origin_of
+from canshaper.commissioning.origins import confirmed, origin_of
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
 from canshaper.edit.edit import Change, FileValue, change, note
 from canshaper.machine.deployment import Deployment
@@ -278,8 +278,12 @@ def write_sensors(
     buses = deployment.config.buses.values() if live else ()
     origin = origin_of("sensor", [log] if log else [], deployment.messages, live=buses)
     written: list[Change] = []
+    measured: list[str] = []
     for finding in findings:
         if not finding.problems:
             values = changes(deployment.axes[finding.axis], finding) | {"origin": origin}
             written.append((("axes", finding.axis, "sway_sensor"), values, note("sensor")))
-    return change(deployment.path, written) if written else []
+            measured += (f"axes.{finding.axis}.sway_sensor.{key}" for key in values)
+    if not written:
+        return []
+    return change(deployment.path, [*written, *confirmed(deployment.path, measured)])
