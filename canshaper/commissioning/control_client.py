@@ -38,7 +38,7 @@ def status(path: Path) -> dict[str, Any]:
 
 
 def person() -> str:
-    """Return the name of the person who runs this program, also by sudo."""
+    """Return the name of the person who runs this program; with sudo the one who called that."""
     return os.environ.get("SUDO_USER") or getpass.getuser()
 
 

@@ -62,7 +62,7 @@ class RobustDesign:
 
     @property
     def bound(self) -> BoundAxis:
-        """Its axis."""
+        """The axis that it is for."""
         return self.task.bound
 
     @property

@@ -53,7 +53,7 @@ class RobustTask:
 
     @property
     def rate_per_s(self) -> float:
-        """Rate of the valve, full speeds per second."""
+        """Slower of rise and fall of the axis' limits, full speeds per second."""
         return self.bound.config.limits.slowest_per_s
 
     def requirements(self) -> dict[str, Any]:

@@ -141,7 +141,7 @@ class CalibrationDrive:
 
     @property
     def moves(self) -> bool:
-        """Whether the last frame that was handed out is a valve's, and an axis moves."""
+        """Whether the frame that was handed out last may move a valve."""
         return self._gated.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
@@ -197,7 +197,7 @@ class CalibrationDrive:
         return self._gated.withhold(frame)
 
     def stalled(self) -> None:
-        """Take note that the loop stood still; moving axes go to neutral."""
+        """Take note that the loop stood still: moving axes trip, frames that waited count no more."""
         self._gated.stalled()
 
     def _sample(self, time_s: float) -> None:

@@ -59,7 +59,7 @@ MODEL_PERIOD, MODEL_RATIO_ABS = 0.013, 0.009
 
 @dataclass(frozen=True, slots=True)
 class Driven(Segment):
-    """One stretch: its data, and the commands that drove it, on the clock of the log."""
+    """One stretch: its data, timed from its start; the commands that drove it, timed by the log."""
 
     command: Command
 

@@ -57,7 +57,7 @@ class Value:
 
     @property
     def relative(self) -> float:
-        """Half width as a part of the value."""
+        """Half width as a part of the value; infinite for a value of 0."""
         return self.half / abs(self.value) if self.value else math.inf
 
 

@@ -170,7 +170,7 @@ class Bench(Protocol):
         """Return who moves the valves, without filters, in a step; at a machine ask the person."""
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:
-        """Drive an axis through its ramp; its valve is neutral afterwards, however it ends.
+        """Drive axes through their ramp until ``drive.ended``; every valve is neutral afterwards.
 
         Args:
             deployment: the machine.
@@ -214,7 +214,7 @@ class Simulated:
         return changed_parameters(self.changes, deployment)
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
-        """See ``Bench``."""
+        """Drive the script of the task; valves stay neutral where they are not ours to move."""
         with self.person.progress("driving") as on_progress:
             log_simulated(
                 log,
@@ -227,11 +227,11 @@ class Simulated:
             )
 
     def raw_mode(self, _step: str) -> Mode:
-        """See ``Bench``."""
+        """Return that we move the valves; nobody is asked."""
         return Mode.RAW
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, _words: str) -> None:
-        """See ``Bench``."""
+        """Drive axes through the ramp as ``run_simulated`` does; nobody is asked."""
         with self.person.progress("driving") as on_progress:
             parameters = self.parameters(deployment)
             run_simulated(drive, deployment, parameters, lambda one: on_progress(one.progress))

@@ -64,7 +64,7 @@ class SensorFit:
     deviations: tuple[float, float, float, float]
 
     def explained(self, noise: float) -> float:
-        """Return the part of the signal beyond noise (rad or rad/s) that commands explain, or 0."""
+        """Return the part of a signal beyond noise, rad or rad/s, that commands explain; else 0."""
         beyond = self.square - self.count * noise**2
         return 1.0 - max(0.0, self.left - self.count * noise**2) / beyond if beyond > 0.0 else 0.0
 

@@ -213,7 +213,7 @@ def _standing(one: Record) -> str:
 
 
 def _step(name: str, one: Record, folder: Path) -> list[str]:
-    """Return the part of a step: what it has shown, its pictures, and its change of the file."""
+    """Return the HTML of a step: what it has shown, its pictures, and its change of the file."""
     parts = [html.heading(f"{name}: {_standing(one)}")]
     for part in one.parts:
         again = shown(part)
@@ -227,7 +227,7 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
 
 
 def _pictures(one: Record, folder: Path) -> list[str]:
-    """Return the pictures of a step: drawings, and bitmaps of what has no drawing."""
+    """Return the pictures of a step as HTML: drawings, and bitmaps of what has no drawing."""
     paths = [folder / picture for picture in one.pictures]
     drawings = {path.stem for path in paths if path.suffix == ".svg"}
     return [embedded(one) for one in paths if one.suffix == ".svg" or one.stem not in drawings]
