@@ -142,8 +142,7 @@ def filter_changes(
     ``designed_for`` carries the origin of the swing: of a machine, or simulated.
 
     Args:
-        deployment: the machine, as its file says.
-        axis: the axis.
+        deployment, axis: the machine, as its file says, and the name of its axis.
         filters: place below the axis, () for its own filter or that of a breakpoint; and the keys
             of the section filter, see ``change``.
         tail_s: tail that they need; None, or one below that of the file, changes nothing.
@@ -183,10 +182,7 @@ def filter_changes(
 def refuse_scheduled(deployment: Deployment, axis: str, cure: str) -> None:
     """Refuse to write one filter where a gain schedule has others, which would stay as they are.
 
-    Args:
-        deployment: the machine.
-        axis: name of the axis.
-        cure: what to do instead.
+    ``cure`` is what to do instead.
 
     Raises:
         UsageError: the axis has a gain schedule.

@@ -36,7 +36,6 @@ class RobustDesign:
 
     Attributes:
         task: its requirements.
-        shaper: the shaper.
         measured: what it leaves through the limits of the machine.
         without: shaper of the same task without its second mode.
         first: taps with which it had to begin.
@@ -103,8 +102,7 @@ def design_robust(
     """Design the shaper of an axis.
 
     Args:
-        deployment: the machine.
-        axis: name of an axis with sway data.
+        deployment, axis: the machine, and the name of an axis with sway data.
         at: number of a breakpoint in the gain schedule; None for the axis' own filter.
         range_pct: lengths of the pendulum that it covers, +- %.
         lengths_m: instead: shortest and longest pendulum that it covers; for an axis that follows

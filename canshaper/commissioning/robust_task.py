@@ -125,9 +125,7 @@ def keys_of_length(sway: Sway, length_m: float) -> dict[str, float]:
 
 
 def second_of(text: str | None, task: RobustTask) -> SecondMode | None:
-    """Return the second mode of the option --second; without it that of the file's filter.
-
-    None is for "none", or where the filter has none either.
+    """Return the mode of --second, None for "none"; without it that of the file's filter, if any.
 
     Raises:
         UsageError: it has another form, does not fit the task, or the axis follows its rope.

@@ -94,8 +94,7 @@ def design_tuned(
     """Tune the G_FF of an axis.
 
     Args:
-        deployment: the machine.
-        axis: name of an axis with sway data.
+        deployment, axis: the machine, and the name of an axis with sway data.
         given: what is asked, by the names of ``Objective``, with ``max_rate_per_s`` and
             ``length_range_pct``; the rest is as the filter in the file was tuned, else the default.
         method: "optimal", or "manual" for the paper's rule.

@@ -61,16 +61,13 @@ class CalibrationDrive:
     """A measurement in progress: frames in, frames out.
 
     Args:
-        deployment: the machine.
-        axis: name of one of its axes.
+        deployment, axis: the machine, and the name of one of its axes.
         speed: (message, signal) of the feedback of its speed.
         ramp: the command to follow.
         also: (message, signal) of a second axis, by its name; it is driven alone after the first,
             then both at once.
 
     Attributes:
-        axis: as above.
-        ramp: as above.
         turns, duration_s: axes that each run of the ramp drives, and the time of all runs.
         moments: demands and speeds of the axes, tick by tick, from the begin of the ramp on.
         ended: why it is over, "done" where all runs are; empty while it goes on.
@@ -197,7 +194,7 @@ class CalibrationDrive:
         return self._gated.withhold(frame)
 
     def stalled(self) -> None:
-        """Take note that the loop stood still: moving axes trip, frames that waited count no more."""
+        """Take note that the loop stood still: moving axes trip, waiting frames do not count."""
         self._gated.stalled()
 
     def _sample(self, time_s: float) -> None:

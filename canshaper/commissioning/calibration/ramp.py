@@ -137,8 +137,7 @@ def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[
     """Return message and signal with the speed of an axis.
 
     Args:
-        deployment: the machine.
-        axis: name of the axis.
+        deployment, axis: the machine, and the name of its axis.
         speed: MESSAGE.SIGNAL; None for the feedback in the file, else that of the simulated crane.
 
     Raises:
@@ -168,10 +167,8 @@ class SpeedFeedback:
     checksum hold. Any other message has to come on the bus of the valve.
 
     Args:
-        deployment: the machine.
-        axis: name of the axis.
-        message: name of the message.
-        signal: its signal.
+        deployment, axis: the machine, and the name of its axis.
+        message, signal: their names in the DBC.
 
     Raises:
         ConfigError: no such message or signal, or one that cannot be measured with.

@@ -38,8 +38,7 @@ def run_live(
     However it ends, the last frames to every valve are neutral.
 
     Args:
-        drive: the measurement.
-        deployment: its machine.
+        drive, deployment: the measurement, and its machine.
         on_progress: called five times a second, and at the end.
 
     Raises:

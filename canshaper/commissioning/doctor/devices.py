@@ -35,7 +35,6 @@ class Link:
     """A network interface.
 
     Attributes:
-        name: of the interface.
         can: whether it is a CAN interface.
         kind: of its driver: can (a controller), vcan, vxcan; None where it is not known.
         up: whether it is set up.
@@ -129,8 +128,7 @@ def device_findings(
     Without such an interface there is no finding.
 
     Args:
-        name: of the bus in the deployment file.
-        bus: its section.
+        name, bus: of the bus in the deployment file, and its section.
         root: of the file system.
         query_kernel: asks for kind and bit rates of the interface with an index.
     """
@@ -157,8 +155,7 @@ def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
     """Return lines to paste: ``match`` for the file; with serial or path files that name it too.
 
     Args:
-        name: of the bus in the deployment file.
-        device: its device now.
+        name, device: of the bus in the deployment file, and its device now.
         root: of the file system.
     """
     match: dict[str, str | int | None] = {"driver": device.driver}

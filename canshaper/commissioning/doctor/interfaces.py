@@ -22,8 +22,7 @@ def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
     """Yield what an interface of python-can can and cannot report.
 
     Args:
-        name: of the bus in the deployment file.
-        bus: its section.
+        name, bus: of the bus in the deployment file, and its section.
         tick_ms: period of the loop.
     """
     subject = f"bus {name} {bus.interface}"

@@ -25,9 +25,7 @@ class WatchedPort(RawPort):
     """A bus on one end of a socket pair; it counts received frames and reports sent ones.
 
     Args:
-        name: of the bus.
-        config: its section.
-        one: the end.
+        name, config, one: of the bus, its section, and the end.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
         fd: identifier, and whether it is extended, of what is sent in frames of CAN FD.

@@ -112,8 +112,7 @@ def run_of(
 
     Args:
         deployment: what was run.
-        record: output of the loop process.
-        hand: output of the joysticks process.
+        record, hand: output of the processes of loop and joysticks.
     """
     began, ended = record["began_ns"], record["ended_ns"]
     sent = list(zip(*[iter(record["sent"])] * 3, strict=True))  # tick, axis, ns

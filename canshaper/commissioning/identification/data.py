@@ -132,8 +132,7 @@ def stopwatch(
     Args:
         swings: full swings (there and back) that were counted.
         seconds: how long they took.
-        first_deg: amplitude at the start, from rest to one side.
-        last_deg: amplitude at the end.
+        first_deg, last_deg: amplitudes at start and end, from rest to one side.
 
     Raises:
         IdentificationError: a number makes no swing, or too few swings were counted.
@@ -161,11 +160,7 @@ def stopwatch(
 
 
 def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> SwingFinding:
-    """Return the finding of a stopwatch: the arguments of ``stopwatch``, in order, by option.
-
-    Raises:
-        UsageError: one is missing, or there is a log.
-    """
+    """Return the finding of numbers for ``stopwatch``, by option; UsageError for None, or a log."""
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
         got = f"none of {', '.join(missing)}" if missing else f"the log {logs[0]}"
@@ -211,8 +206,8 @@ def logged(
 ) -> list[SwingFinding]:
     """Return the findings of logs (LOG or LABEL=LOG), one for each axis and label.
 
-    A label that is a number is the load state where the log has none. For options see ``read_can``
-    and ``find_free``.
+    A label that is a number is the load state where the log has none. For the options see
+    ``read_can`` and ``find_free``.
     """
     if not logs:
         raise UsageError(

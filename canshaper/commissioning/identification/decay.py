@@ -122,8 +122,7 @@ def covariance_of(
 
     Args:
         residual: of all data, one after the other, by the parameters.
-        x: the parameters of the best fit.
-        steps: a small change of each, for the derivative.
+        x, steps: the best parameters, and a small change of each for the derivative.
         data: in the order of the residual.
         omega: frequency of the swing, rad/s.
     """

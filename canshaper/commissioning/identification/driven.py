@@ -140,7 +140,6 @@ class DrivenProblem:
     """Least squares over the model of a driven swing, whose linear parameters are eliminated.
 
     Attributes:
-        data: the stretches.
         model: returns for each stretch, by the parameters, its swing at 1 m/s full speed, and the
             columns of its free swing and offset.
         low, high, scale: bounds of the parameters, and the size of a step of each.

@@ -42,7 +42,6 @@ class AxisFinding:
     """Finding of a measurement of one axis.
 
     Attributes:
-        axis: name of the axis.
         problems: why nothing of it may be used, each with what to do; empty where it may be used.
         notes: what else a person should know.
     """

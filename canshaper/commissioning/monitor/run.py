@@ -78,10 +78,8 @@ def run_live(
     """Draw the state of the machine until a person ends it.
 
     Args:
-        deployment: the machine.
-        console: the terminal.
-        rate_hz: how often it is drawn.
-        going: whether to go on.
+        deployment, console: the machine and the terminal.
+        rate_hz, going: how often it is drawn, and whether to go on.
 
     Raises:
         BusError: a bus cannot be opened.

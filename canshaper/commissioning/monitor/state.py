@@ -35,8 +35,7 @@ class MessageRate:
     """How often one message of the deployment comes.
 
     Attributes:
-        name: of the message, in the DBC.
-        cycle_ms: its cycle there; None without one.
+        cycle_ms: its cycle in the DBC; None without one.
         last_ns: when it came last; None before.
     """
 
@@ -74,9 +73,6 @@ class MessageRate:
 
 class Monitor:
     """State of a machine, from every frame that is received.
-
-    Args:
-        deployment: the machine.
 
     Attributes:
         history: of the status messages.

@@ -96,10 +96,8 @@ def screen(
     """Return the whole state at a moment, in as many lines as the terminal has.
 
     Args:
-        monitor: what is known.
-        now_ns: wall clock.
-        width: columns of the terminal.
-        height: its lines.
+        monitor, now_ns: what is known, and the wall clock.
+        width, height: columns and lines of the terminal.
         plain: only characters of ASCII.
         keys: what a person has chosen; None where no key can come.
     """

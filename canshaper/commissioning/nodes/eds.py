@@ -31,9 +31,6 @@ _VARIABLES = (0x2, 0x7)  # DOMAIN, VAR
 class Eds:
     """An EDS or DCF file.
 
-    Args:
-        path: an EDS or DCF.
-
     Attributes:
         node: node id of a DCF; None where it has none.
 

@@ -79,8 +79,7 @@ def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]])
     """Return the parameters to change in a node, in this order; last one that stores them.
 
     Args:
-        name: its name.
-        node: the node, as its EDS has it.
+        name, node: its name, and the node as its EDS has it.
         used: its PDOs that the deployment uses.
     """
     needed = [*_services(node), *(one for pdo, use in used for one in _of_pdo(node, pdo, use))]

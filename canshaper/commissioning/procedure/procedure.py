@@ -58,7 +58,6 @@ class Procedure:
         origin: the file that a rehearsal's is a copy of.
 
     Attributes:
-        files: as above.
         state: how far it has come.
         news: what a person has to know before the next step.
 
