@@ -100,14 +100,13 @@ def test_without_enough_data_nothing_is_written(tmp_path: Path, file: Path) -> N
 
 
 def test_what_was_measured_is_assumed_no_more(file: Path) -> None:
-    kept = "axes.near_far.sway.period_s"
-    measured = "axes.near_far.sway_sensor.delay_ms"
+    kept, measured = "axes.near_far.sway.period_s", "axes.near_far.sway_sensor.delay_ms"
     file.write_text(f"{file.read_text()}assumed: [{kept}, {measured}]\n")
-    times = np.arange(100) * 0.02
-    series = Series("log", Unit(Kind.ANGLE, 1.0, "rad"), times, times)
-    data = [Driven("log", 0.0, times, times, Kind.ANGLE, Command(times, times))]
-    fit = SensorFit(1.0, 0.04, 2.0, 0.1, np.zeros(1), [times], 1.0, 0.0, 100, (1e-3,) * 4)
-    finding = SensorFinding("near_far", series, data, fit, noise=0.1)
+    every = np.arange(100) * 0.02
+    data = Driven("log", 0.0, every, every, Kind.ANGLE, Command(every, every))
+    fit = SensorFit(1.0, 0.04, 2.0, 0.1, np.zeros(1), [every], 1.0, 0.0, 100, (1e-3,) * 4)
+    series = Series("log", Unit(Kind.ANGLE, 1.0, "rad"), every, every)
+    finding = SensorFinding("near_far", series, [data], fit, noise=0.1)
     write_sensors(load_deployment(file), [finding], None, live=False)
     assert load_deployment(file).config.assumed == [kept]
 
