@@ -57,7 +57,7 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
 
 
 def rehearse(path: Path, what: str) -> dict[str, Any]:
-    """Ask a running daemon to make a fault by its name, to ``end`` or ``report`` it; return that.
+    """Let a running daemon make a fault by its name, ``end`` or ``report`` it; return its report.
 
     Raises:
         ControlError: no daemon answers, or it refuses.

@@ -118,7 +118,7 @@ def _senders(deployment: Deployment) -> Mistakes:
 
 
 def _speeds(deployment: Deployment) -> Mistakes:
-    """Yield full speeds far below another axis', or of no radius of the crane: stops need them."""
+    """Yield full speeds far below another axis' or off every radius; stop distances need them."""
     axes = {n: (a.sway.full_speed_m_s, a) for n, a in deployment.config.axes.items() if a.sway}
     fastest = max(axes, key=lambda name: axes[name][0], default="")
     for name, (speed, axis) in axes.items():

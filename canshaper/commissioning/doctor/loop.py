@@ -25,7 +25,8 @@ class WatchedPort(RawPort):
     """A bus on one end of a socket pair; it counts received frames and reports sent ones.
 
     Args:
-        name, config, one: of the bus, its section, and the end.
+        name, config: of the bus, and its section.
+        one: its end of the socket pair.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
         fd: identifier, and whether it is extended, of what is sent in frames of CAN FD.

@@ -95,7 +95,7 @@ def ready(process: "subprocess.Popen[str]") -> None:
 
 
 def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
-    """Return the output of a child at its end; wait for that so long, or for ever (None).
+    """Wait until a child ends, at most ``limit_s`` (None: for ever); return its output.
 
     Raises:
         MeasurementError: it failed.

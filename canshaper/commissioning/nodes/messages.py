@@ -25,7 +25,7 @@ _BYTE = (8, 16, 32)
 
 
 def bytes_of(node: Node) -> dict[str, bool]:
-    """Return labels of bytes and words that a node sends; True where its profile has switches."""
+    """Return labels of bytes and words that a node sends; True for switches by its profile."""
     digital_by_name = {}
     for pdo in node.pdos:
         for one, name in zip(pdo.objects, labels(pdo.objects), strict=True):

@@ -214,7 +214,7 @@ class Simulated:
         return changed_parameters(self.changes, deployment)
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
-        """Drive the script of the task; valves stay neutral where they are not ours to move."""
+        """Drive the script of the task; valves stay neutral where its mode is not to move them."""
         with self.person.progress("driving") as on_progress:
             log_simulated(
                 log,
