@@ -16,7 +16,7 @@ ANSWER_S = 5.0
 
 
 def table(path: Path) -> dict[str, dict[str, float]]:
-    """Return the adjustable numbers by key, with ``now``, ``file``, ``low`` and ``high``.
+    """Return a daemon's adjustable numbers by key, each with ``now``, ``file``, ``low``, ``high``.
 
     Raises:
         ControlError: no daemon answers.
@@ -38,7 +38,7 @@ def status(path: Path) -> dict[str, Any]:
 
 
 def person() -> str:
-    """Return the name of the person who runs this program, also by sudo."""
+    """Return the name of the person who runs this program; with sudo the one who called that."""
     return os.environ.get("SUDO_USER") or getpass.getuser()
 
 
@@ -57,7 +57,7 @@ def change(path: Path, values: Mapping[str, float], by: str = "") -> None:
 
 
 def rehearse(path: Path, what: str) -> dict[str, Any]:
-    """Ask a running daemon to make a fault by its name, or to ``end`` or ``report`` it.
+    """Let a running daemon make a fault by its name, ``end`` or ``report`` it; return its report.
 
     Raises:
         ControlError: no daemon answers, or it refuses.
@@ -72,7 +72,7 @@ def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
 
     Args:
         path: its control socket.
-        on_wait: called again and again meanwhile; an error that it raises ends the wait.
+        on_wait: called between two questions to sleep; an error that it raises ends the wait.
 
     Returns:
         The folder where it was written.

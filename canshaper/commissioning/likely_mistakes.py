@@ -21,7 +21,7 @@ Mistakes = Iterator[tuple[Place, str]]
 
 
 def warnings_of(deployment: Deployment) -> list[Problem]:
-    """Return warnings: filters that do not fit, travel not stated, guesses, likely mistakes."""
+    """Return warnings: unfit filters, travel or oil not stated, guesses, likely mistakes."""
     source = Source(deployment.path)
     config = deployment.config
     poor = ((place, str(one)) for place, one in verdicts(deployment) if one.word != "good")
@@ -31,7 +31,7 @@ def warnings_of(deployment: Deployment) -> list[Problem]:
 
 
 def _pump(deployment: Deployment) -> Mistakes:
-    """Yield that the file does not say whether the pump has oil for two axes at once."""
+    """Yield that the file does not say whether the pump has oil for two filtered axes at once."""
     axes = deployment.config.axes
     shaped = [name for name, axis in axes.items() if axis.filter.kind != "off"]
     crane = deployment.config.crane
@@ -118,7 +118,7 @@ def _senders(deployment: Deployment) -> Mistakes:
 
 
 def _speeds(deployment: Deployment) -> Mistakes:
-    """Yield full speeds that do not fit each other: stopping distances follow from them."""
+    """Yield full speeds far below another axis' or off every radius; stop distances need them."""
     axes = {n: (a.sway.full_speed_m_s, a) for n, a in deployment.config.axes.items() if a.sway}
     fastest = max(axes, key=lambda name: axes[name][0], default="")
     for name, (speed, axis) in axes.items():

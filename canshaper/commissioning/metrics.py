@@ -84,7 +84,7 @@ def _metrics(now: Mapping[str, Any]) -> Iterator[Metric]:
 def _states(
     what: str, words: str, now: Mapping[str, str], possible: Iterable[str]
 ) -> GaugeMetricFamily:
-    """Return a series for each possible state, by the conventions of Prometheus."""
+    """Return a series for each name and possible state: 1 for its state now, else 0."""
     gauge = GaugeMetricFamily(f"canshaper_{what}_state", words, labels=(what, "state"))
     for state in possible:
         for name, state_now in now.items():

@@ -32,7 +32,7 @@ MEASURE = "measure it (canshaper commission), or read it in a manual; then take 
 
 
 def assumptions(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
-    """Yield the numbers that no one has measured or typed, by axis: where, and what to do."""
+    """Yield wrong keys of ``assumed``, and by axis the guessed numbers: where, and what to do."""
     known = {key_path(place): value for place, value in _numbers(config)}
     for i, key in enumerate(config.assumed):
         if key not in known:
@@ -46,7 +46,7 @@ def assumptions(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
 
 
 def confirmed(path: Path, keys: Iterable[str]) -> list[Change]:
-    """Return the change of ``assumed`` in the file: these numbers are measured or typed now.
+    """Return the change, if any, that takes numbers now measured or typed out of ``assumed``.
 
     Raises:
         ConfigError: the file cannot be read.
@@ -57,7 +57,7 @@ def confirmed(path: Path, keys: Iterable[str]) -> list[Change]:
 
 
 def write_numbers(path: Path, values: Mapping[str, float]) -> None:
-    """Write numbers that a person has set into a deployment file; see ``change``.
+    """Write numbers that a person has set into a deployment file, by key; none stays assumed.
 
     Raises:
         ConfigError: the file cannot be changed.
@@ -142,8 +142,7 @@ def filter_changes(
     ``designed_for`` carries the origin of the swing: of a machine, or simulated.
 
     Args:
-        deployment: the machine, as its file says.
-        axis: the axis.
+        deployment, axis: the machine, as its file says, and the name of its axis.
         filters: place below the axis, () for its own filter or that of a breakpoint; and the keys
             of the section filter, see ``change``.
         tail_s: tail that they need; None, or one below that of the file, changes nothing.
@@ -183,10 +182,7 @@ def filter_changes(
 def refuse_scheduled(deployment: Deployment, axis: str, cure: str) -> None:
     """Refuse to write one filter where a gain schedule has others, which would stay as they are.
 
-    Args:
-        deployment: the machine.
-        axis: name of the axis.
-        cure: what to do instead.
+    ``cure`` is what to do instead.
 
     Raises:
         UsageError: the axis has a gain schedule.
@@ -224,7 +220,7 @@ _FRAMES = 5000
 def is_simulated(log: Path, messages: Messages) -> bool:
     """Return whether a log is of a virtual bus, or has messages of the simulated crane.
 
-    A table is of a machine.
+    Its first ``_FRAMES`` frames are looked at. A table is of a machine.
 
     Raises:
         LogError: the log cannot be read.

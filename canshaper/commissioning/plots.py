@@ -33,8 +33,7 @@ def of_valve(axis: str, limits: OutputLimits, measured: Calibration, top_pct: fl
     """Draw speed over command of a valve: by the file, and as measured.
 
     Args:
-        axis: its name.
-        limits: those of the file.
+        axis, limits: its name and its limits in the file.
         measured: what was measured.
         top_pct: largest command that was driven.
     """

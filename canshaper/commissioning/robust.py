@@ -36,7 +36,6 @@ class RobustDesign:
 
     Attributes:
         task: its requirements.
-        shaper: the shaper.
         measured: what it leaves through the limits of the machine.
         without: shaper of the same task without its second mode.
         first: taps with which it had to begin.
@@ -52,7 +51,7 @@ class RobustDesign:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Verdict on the shaper over its lengths; it names a longer one that is good."""
+        """Verdict on the shaper over its lengths; it names a longer shaper that is good, if any."""
         task, shaper = self.task, self.shaper
         setup = task.mode, task.tick_s, task.in_file(shaper), task.machine_of(shaper)
         verdict = judge(*setup, task.range_pct)
@@ -62,7 +61,7 @@ class RobustDesign:
 
     @property
     def bound(self) -> BoundAxis:
-        """Its axis."""
+        """The axis that it is for."""
         return self.task.bound
 
     @property
@@ -77,13 +76,13 @@ class RobustDesign:
 
     @property
     def needed_s(self) -> float | None:
-        """Tail that it needs, where that of the file is shorter."""
+        """Tail that it needs, s, where that of the file is shorter; else None."""
         lasts_s = self.task.lasts * self.shaper.duration_s
         return round(lasts_s + 0.1, 1) if self.bound.config.limits.tail_s < lasts_s else None
 
     @property
     def reversal_s(self) -> float | None:
-        """Reversal that its second mode needs, where that of the file cuts the response off."""
+        """``reversal_s`` that its second mode needs, where that of the file is less; else None."""
         design = self.chosen.design()
         return design.reversal_s(self.bound.config.limits) if design else None
 
@@ -103,21 +102,20 @@ def design_robust(
     """Design the shaper of an axis.
 
     Args:
-        deployment: the machine.
-        axis: name of an axis with sway data.
+        deployment, axis: the machine, and the name of an axis with sway data.
         at: number of a breakpoint in the gain schedule; None for the axis' own filter.
         range_pct: lengths of the pendulum that it covers, +- %.
-        lengths_m: instead: shortest and longest pendulum that it covers; of a rope that it
-            follows, which it is designed for at its shortest.
+        lengths_m: instead: shortest and longest pendulum that it covers; for an axis that follows
+            its rope the ends of that, of which it is designed for the shortest.
         duration_s: length of its impulse response; None for 0.77 of a swing, one with lengths.
-        residual_pct: instead: the shortest that leaves at most this.
+        residual_pct: instead: part of the swing that the shortest such shaper may leave.
         second: a second mode as the option --second has it; None for that of the filter in the
             file.
         first: taps with which it begins, where it has a duration.
 
     Raises:
         DesignError: the axis has no sway data.
-        UsageError: there is no such shaper.
+        UsageError: there is no such shaper, or the options contradict each other.
     """
     bound, sway = swinging_axis(deployment, axis)
     sway = sway if at is None else bound.config.gain_schedule[at].sway
@@ -159,7 +157,7 @@ def design_robust(
 def _with_longer(
     task: RobustTask, shaper: RobustShaper, verdict: Verdict, first: Sequence[float]
 ) -> Verdict:
-    """Return the verdict, which names the shortest longer response that is good."""
+    """Return the verdict, which names the first of some longer responses that is good, if any."""
     for times in _LONGER:
         seconds = round(times * shaper.duration_s / task.tick_s) * task.tick_s
         if round(seconds / task.tick_s) + 1 > _MOST_TAPS:
@@ -176,9 +174,10 @@ def _with_longer(
 def design_loads(
     deployment: Deployment, axis: str, *, duration_s: float | None, **options: Any
 ) -> list[RobustDesign]:
-    """Design the filter of every breakpoint of an axis, and its own where that is of another kind.
+    """Design the shaper of every breakpoint of an axis, and its own one in place of another kind.
 
-    ``duration_s`` is for the shortest swing; others get more in proportion. See ``design_robust``.
+    ``duration_s`` is for the shortest swing, which comes first; others get more in proportion.
+    ``options`` are those of ``design_robust``.
 
     Raises:
         UsageError: there is no gain schedule, or no such shaper.

@@ -77,7 +77,7 @@ def print_loads(deployment: Deployment, designs: Sequence[RobustDesign], console
 
 
 def write_design(deployment: Deployment, *designs: RobustDesign) -> list[str]:
-    """Write the designs of an axis into the file; return changed lines and notes."""
+    """Write the designs of an axis, and their lengths; return changed lines and notes."""
     config, parts = designs[0].bound.config, []
     for one in designs:
         at = one.task.at

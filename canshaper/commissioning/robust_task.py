@@ -48,16 +48,16 @@ class RobustTask:
 
     @property
     def tick_s(self) -> float:
-        """Tick of the axis."""
+        """Tick of the axis, s."""
         return self.tick_ms / 1000.0
 
     @property
     def rate_per_s(self) -> float:
-        """Rate of the valve, full speeds per second."""
+        """Slower of rise and fall of the axis' limits, full speeds per second."""
         return self.bound.config.limits.slowest_per_s
 
     def requirements(self) -> dict[str, Any]:
-        """Return the arguments of ``least_residual`` and ``shortest``."""
+        """Return the arguments that ``least_residual`` and ``shortest`` have in common."""
         names = "tick_s", "range_pct", "rate_per_s", "second"
         return {name: getattr(self, name) for name in names}
 
@@ -67,7 +67,7 @@ class RobustTask:
         return replace(own, limits=replace(own.limits, tail_s=max(own.limits.tail_s, tail_s)))
 
     def machine_of(self, shaper: RobustShaper) -> Machine:
-        """Return valve and limits with the tail that is written with a shaper for lengths."""
+        """Return valve and limits; with lengths the tail is at least as long as the shaper."""
         return self.machine(shaper.duration_s if self.lengths_m else 0.0)
 
     def section(self, shaper: RobustShaper) -> dict[str, Any]:
@@ -125,7 +125,11 @@ def keys_of_length(sway: Sway, length_m: float) -> dict[str, float]:
 
 
 def second_of(text: str | None, task: RobustTask) -> SecondMode | None:
-    """Return the second mode of the option --second; without it that of the file's filter."""
+    """Return the mode of --second, None for "none"; without it that of the file's filter, if any.
+
+    Raises:
+        UsageError: it has another form, does not fit the task, or the axis follows its rope.
+    """
     config, at = task.bound.config, task.at
     design = (config if at is None else config.gain_schedule[at]).filter.design()
     if text is None and design and (own := design.second):

@@ -74,7 +74,10 @@ class Travel:
 
 @dataclass(frozen=True, slots=True)
 class Stopping:
-    """Stopping of one axis from its full speed; travel in seconds of full speed."""
+    """Stopping of one axis from its full speed; travel in seconds of full speed.
+
+    ``maximum`` is max_pct as a part, ``stated_m`` the file's stop_distance_m; see ``needed_s``.
+    """
 
     name: str
     speed: FullSpeed
@@ -100,7 +103,7 @@ def stopping(deployment: Deployment) -> list[Stopping]:
 
 
 def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: float | None) -> str:
-    """Return the stopping distance with another filter of an axis, and a longer tail, in words."""
+    """Return in words the stopping distance with another filter, and what forbids its tail."""
     bound = deployment.axes[name]
     changes: dict[str, Any] = {"filter": chosen, "gain_schedule": [], "profiles": {}}
     one = _stopping(deployment, replace(bound, config=bound.config.model_copy(update=changes)))
@@ -142,7 +145,7 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
 
 
 def _variants(bound: BoundAxis) -> Iterator[BoundAxis]:
-    """Yield the axis with each pair of sway and filter that its file names."""
+    """Yield the axis with each pair of sway and filter of the file, and at the ends of a rope."""
     config = bound.config
     parts: list[AxisSection | Profile] = [config, *config.profiles.values()]
     for part in parts:
@@ -256,7 +259,7 @@ def _travel(axis: ShapedAxis, sign: float, timeout_s: float, period_s: float) ->
 def needed_s(
     new_axis: Callable[[], ShapedAxis], tail_s: float, *, timeout_s: float, period_s: float
 ) -> float:
-    """Return the least bound of travel that does not cut the run-on of a filter short.
+    """Return the least bound of travel, s of full speed, that cuts no run-on of a filter short.
 
     It holds for every stroke at full speed, and includes the timeout of a lost joystick.
 
@@ -282,7 +285,7 @@ def needed_s(
 def _way(
     steady: ShapedAxis, joystick: CommandInput, sign: float, period_s: float
 ) -> tuple[float, int]:
-    """Return the travel in the old direction, and the number of ticks with motion there."""
+    """Return the travel in the old direction, s of full speed, and how many ticks that takes."""
     axis = copy.deepcopy(steady)
     way_s = most_s = 0.0
     last = 0

@@ -43,7 +43,7 @@ def axes(message: Message) -> list[Signal]:
 
 
 def velocities(message: Message) -> list[Signal]:
-    """Return the signals that are a two-sided velocity, also with a scaling of the file."""
+    """Return the signals that may be a two-sided velocity, perhaps with a scaling in the file."""
     return [s for s in message.signals if two_sided(s)]
 
 
@@ -56,7 +56,7 @@ def two_sided(signal: Signal) -> bool:
 
 
 def one_sided(message: Message) -> list[Signal]:
-    """Return the signals that may be a velocity around a middle value, or with flags."""
+    """Return the signals that may be a velocity around a middle value, or with direction flags."""
     return [
         s
         for s in message.signals
@@ -66,7 +66,7 @@ def one_sided(message: Message) -> list[Signal]:
 
 
 def direction_flags(message: Message, signal: Signal) -> tuple[str, str, str] | None:
-    """Return the flags of neutral, negative and positive of a signal, found by their names."""
+    """Return flags of neutral, negative and positive of a signal by name; None unless all three."""
     flags = switches(message)
     near = sorted(
         flags, key=lambda s: (-likeness(s.name, signal.name), abs(s.start - signal.start))
@@ -97,7 +97,7 @@ def likely_middle(signal: Signal) -> float:
 
 
 def likely_full(signal: Signal, zero: float = 0.0) -> float:
-    """Return the likely distance from zero to full: to the nearer end of its reach."""
+    """Return the likely distance from zero to full: to the nearer end of its reach; 1 without."""
     low, high = reach(signal)
     full = min(zero - low, high - zero) if low < zero < high else high - zero
     return full if math.isfinite(full) else 1.0
@@ -109,7 +109,7 @@ def switches(message: Message) -> list[Signal]:
 
 
 def switch_parts(message: Message) -> list[Signal]:
-    """Return wider signals that can be a switch as a whole, and each bit of them, SIGNAL/BIT."""
+    """Return signals of a byte at most that can be a switch, and each bit of theirs, SIGNAL/BIT."""
     parts: list[Signal] = []
     for s in message.signals:
         bits = s.length <= SWITCH_BITS if s.is_signed else SWITCH_BITS < s.length <= _BYTE
@@ -143,7 +143,7 @@ def enabling_code(signal: Signal) -> int | None:
 
 
 def named(signals: Sequence[Signal], pattern: re.Pattern[str]) -> str | None:
-    """Return the first signal whose name matches; None for none."""
+    """Return the name of the first signal whose name matches; None for none."""
     return next((s.name for s in signals if pattern.search(s.name)), None)
 
 
@@ -160,7 +160,7 @@ def joysticks(messages: Sequence[Message]) -> list[Message]:
 
 
 def likely_joysticks(messages: Sequence[Message]) -> list[Message]:
-    """Return messages as likely as the first: cyclic with a switch, or two-sided, or all."""
+    """Return the messages that are as likely a joystick as the likeliest one."""
     candidates = joysticks(messages)
     ranks = [_rank(m, candidates) for m in candidates]
     return [m for m, rank in zip(candidates, ranks, strict=True) if rank == ranks[0]]
@@ -191,7 +191,7 @@ def commands(message: Message) -> list[Signal]:
 
 
 def valve_signals(message: Message) -> list[Signal]:
-    """Return signals as ``commands``, or where there is none those that can with a scaling."""
+    """Return the signals of ``commands``, else those that can be one by a scaling in the file."""
     fine = [
         s
         for s in message.signals
@@ -258,7 +258,7 @@ def is_status(message: Message) -> bool:
 
 
 def status_of(messages: Sequence[Message], axis: str) -> Message | None:
-    """Return the status message of an axis, by its name; None for none."""
+    """Return the cyclic status message that is named like an axis; None for none."""
     candidates = [m for m in messages if is_status(m) and m.cycle_time]
     likely = max(candidates, key=lambda m: likeness(m.name, axis), default=None)
     return likely if likely and likeness(likely.name, axis) >= LIKELY else None

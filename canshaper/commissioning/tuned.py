@@ -42,10 +42,10 @@ class TunedDesign:
         tuning: the poles that answer it.
         setting: the poles with the digits of a file, and what they do.
         before: the setting in the file, where its filter is a G_FF.
-        tail: tail that it needs, and the swing that is left with it; see ``deploy.tail_for``.
+        tail: tail that it needs, s, and part of the swing that it leaves; None for none.
         verdict: whether it damps.
         objective: keys for the file that tune it again; None for the manual rule.
-        choices: front that a preference has chosen from.
+        choices: settings that a preference has chosen from; none without a preference.
     """
 
     bound: BoundAxis
@@ -73,7 +73,7 @@ class TunedDesign:
 
     @property
     def longer_tail(self) -> tuple[float, float] | None:
-        """The tail that it needs, where that of the file is shorter."""
+        """``tail`` where that of the file is shorter; else None."""
         short = self.tail and self.tail[0] > self.bound.config.limits.tail_s
         return self.tail if short else None
 
@@ -94,8 +94,7 @@ def design_tuned(
     """Tune the G_FF of an axis.
 
     Args:
-        deployment: the machine.
-        axis: name of an axis with sway data.
+        deployment, axis: the machine, and the name of an axis with sway data.
         given: what is asked, by the names of ``Objective``, with ``max_rate_per_s`` and
             ``length_range_pct``; the rest is as the filter in the file was tuned, else the default.
         method: "optimal", or "manual" for the paper's rule.
@@ -155,7 +154,7 @@ def design_tuned(
 
 
 def _asked(bound: BoundAxis, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options, completed by those of the filter in the file, else by defaults."""
+    """Return options, else those of the file's filter, else defaults; UsageError for two aims."""
     named = [aim for aim in _AIMS if aim & given.keys()]
     if len(named) > 1:
         raise UsageError("expected one of --preference, --length-range and weights, got several")

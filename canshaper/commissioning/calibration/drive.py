@@ -33,8 +33,8 @@ class _RampJoystick:
     """A joystick that is held in neutral with its enable on; the ramp replaces its deflection.
 
     Attributes:
-        deflection: command of the ramp; 0 for an axis that is not measured.
-        moved: whether the joystick itself is not in neutral.
+        deflection: command of the ramp, part of full; 0 for an axis that is not measured.
+        moved: whether the joystick itself, valid and enabled, is not in neutral.
     """
 
     def __init__(self, joystick: JoystickInput) -> None:
@@ -45,7 +45,7 @@ class _RampJoystick:
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> tuple[CommandInput, int]:
-        """Return the input that the axis may use now, and how often enable was released."""
+        """Return the ramp, or why the joystick forbids it; and the releases of enable so far."""
         given, releases = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
         usable = given.fault is None and given.enabled
         self.moved = usable and abs(given.command) > neutral_band
@@ -61,20 +61,17 @@ class CalibrationDrive:
     """A measurement in progress: frames in, frames out.
 
     Args:
-        deployment: the machine.
-        axis: name of one of its axes.
+        deployment, axis: the machine, and the name of one of its axes.
         speed: (message, signal) of the feedback of its speed.
-        ramp: the command.
+        ramp: the command to follow.
         also: (message, signal) of a second axis, by its name; it is driven alone after the first,
             then both at once.
 
     Attributes:
-        axis: as above.
-        ramp: as above.
         turns, duration_s: axes that each run of the ramp drives, and the time of all runs.
-        moments: demands and speeds of the axes, tick by tick.
-        ended: why it is over; empty while it goes on.
-        progress: how much of the ramp is done, 0 to 1.
+        moments: demands and speeds of the axes, tick by tick, from the begin of the ramp on.
+        ended: why it is over, "done" where all runs are; empty while it goes on.
+        progress: how much of all runs is done, 0 to 1.
 
     Raises:
         ConfigError: no such message or signal; the ramp is faster than the file's ``max_pct``.
@@ -124,7 +121,7 @@ class CalibrationDrive:
 
     @property
     def waiting_for(self) -> str:
-        """Condition that the axis still waits for before the ramp begins; empty afterwards."""
+        """What the ramp waits for before it begins, a reason or words; empty afterwards."""
         if self._begun_ns is not None:
             return ""
         for control, joystick, _ in self._driven.values():
@@ -141,7 +138,7 @@ class CalibrationDrive:
 
     @property
     def moves(self) -> bool:
-        """Whether the last frame that was handed out is a valve's, and an axis moves."""
+        """Whether the frame that was handed out last may move a valve."""
         return self._gated.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
@@ -151,7 +148,7 @@ class CalibrationDrive:
         return self._gated.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """Run one tick, and yield the frames to send."""
+        """Begin, follow or end the ramp (see ``ended``); yield the frames to send in this tick."""
         driven = self._driven.values()
         valid = all(speed.valid(now_ns) for *_, speed in driven)
         waits = [one.axis for one, *_ in driven if one.axis.state is not State.READY]
@@ -193,11 +190,11 @@ class CalibrationDrive:
         self._gated.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a valve frame comes too late to leave."""
+        """Return whether a late valve frame moves a valve, and so must not leave."""
         return self._gated.withhold(frame)
 
     def stalled(self) -> None:
-        """Take note that the loop stood still; moving axes go to neutral."""
+        """Take note that the loop stood still: moving axes trip, waiting frames do not count."""
         self._gated.stalled()
 
     def _sample(self, time_s: float) -> None:
@@ -211,7 +208,7 @@ class CalibrationDrive:
         self.moments.append(moment)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return a neutral frame for every valve."""
+        """Return the neutral frames to send last, without those that the gate refuses."""
         return self._gated.neutral_frames()
 
     def check_ended(self) -> None:
@@ -220,7 +217,7 @@ class CalibrationDrive:
             raise CalibrationError(f"the measurement was not taken to its end: {self.ended}")
 
     def result(self) -> Calibration:
-        """Return the measured valve.
+        """Return the measured valve of ``axis``.
 
         Raises:
             CalibrationError: it did not go to its end, or makes no curve.
@@ -252,7 +249,7 @@ def _check_top(deployment: Deployment, axis: str, ramp: Ramp) -> None:
     """Check that the ramp is no faster than the file allows.
 
     Raises:
-        ConfigError: it is.
+        ConfigError: it is faster.
     """
     limits = deployment.config.axes[axis].limits
     curve = limits.curve()

@@ -34,10 +34,11 @@ class Direction:
 
     Attributes:
         opens: command at which it begins to move, part of full.
-        points: (command, speed) from there to the top of the ramp, speed in the unit of feedback.
+        points: (command, speed) on the way from there to the top of the ramp, and at a top below
+            97 % of full command; speed in the unit of the feedback.
         delay: difference of the commands at which it opens on the way up and closes on the way
             down, part of full; the delay of the valve makes it.
-        full: speed at full command, in a straight line through the first and the last point.
+        full: speed at full command, in a straight line through the first point and the top.
     """
 
     opens: float
@@ -54,7 +55,7 @@ class Calibration:
     negative: Direction
 
     def curve(self) -> tuple[list[float], list[float]]:
-        """Return commands and speeds, % of the full speed of the faster direction, for the file."""
+        """Return rising commands, % of full, and speeds, % of the faster direction's full speed."""
         full = max(self.positive.full, self.negative.full)
         commands, speeds = list[float](), list[float]()
         for sign, one in ((-1.0, self.negative), (1.0, self.positive)):
@@ -97,7 +98,7 @@ def fit(
         noise: standard deviation of the feedback at rest.
 
     Raises:
-        CalibrationError: it did not move, or not enough to measure.
+        CalibrationError: it did not move steadily, got no faster, or too few samples came.
     """
     if not (up and held and down):
         raise CalibrationError("no feedback came while the axis was driven")
@@ -150,14 +151,17 @@ def _opening(
     settled: float,
     moving: float,
 ) -> tuple[float, float]:
-    """Return the command at which the valve opens, and the difference between both ways.
+    """Return the command at which the valve opens, and how much later it opens than it closes.
 
     Args:
         rising: samples of the way up.
         falling: samples of the way down.
-        middle: part of the speed at the largest command about which the lines are laid.
-        settled: that speed.
+        middle: lines are laid through the speeds around this part of ``settled``.
+        settled: speed at the largest command.
         moving: the least speed that is motion.
+
+    Raises:
+        CalibrationError: too few samples, or the speed does not rise.
     """
     low = max((middle - 0.5 * WINDOW) * settled, moving)
     high = (middle + 0.5 * WINDOW) * settled
@@ -174,7 +178,7 @@ def _opening(
 
 
 def _line(samples: Sequence[Sample]) -> tuple[float, float]:
-    """Return command at speed zero and slope of the least-squares line through samples."""
+    """Return command at speed zero and slope of the best line; slope 0 where it does not rise."""
     n = len(samples)
     c, s = sum(x.command for x in samples) / n, sum(x.speed for x in samples) / n
     spread = math.fsum((x.command - c) ** 2 for x in samples)
@@ -185,7 +189,7 @@ def _line(samples: Sequence[Sample]) -> tuple[float, float]:
 
 
 def _speed_at(samples: Sequence[Sample], command: float, top: float) -> float:
-    """Return the speed at a command: the mean of the samples near it."""
+    """Return the mean speed within 3 % of ``top`` of a command; CalibrationError for none."""
     width = 0.03 * top
     near = [s.speed for s in samples if abs(s.command - command) <= width]
     if not near:
@@ -196,7 +200,7 @@ def _speed_at(samples: Sequence[Sample], command: float, top: float) -> float:
 def curve_lines(
     deployment: Deployment, axis: str, result: Calibration, top_pct: float
 ) -> list[str]:
-    """Return the lines that show a measured curve, after the numbers of the file."""
+    """Return lines for people: dead band or curve of the file, the measured curve, its limit."""
     limits = deployment.axes[axis].config.limits
     now = f"deadband_pct {limits.deadband_pct:g}"
     if limits.curve_command_pct and limits.curve_speed_pct:
@@ -221,7 +225,7 @@ def curve_lines(
 def write_curve(
     deployment: Deployment, axis: str, result: Calibration, origin: dict[str, Any]
 ) -> None:
-    """Write the curve of a valve, and where it was measured (see ``origin_of``).
+    """Write the curve of a valve and its origin (``origin_of``) in place of ``deadband_pct``.
 
     Raises:
         ConfigError: the file cannot be changed.

@@ -2,7 +2,7 @@
 
 The part of its speed alone that each axis keeps shows how much the pump delivers, and how the valve
 shares it. Speeds stand for flows: the valve curve of the file says which part of full speed a
-command asks for.
+command asks for. Unit is the full axis flow: what an axis with a share of 1 takes at full speed.
 """
 
 import math
@@ -38,7 +38,7 @@ ALIKE = 0.1
 STANDING, BETWEEN, AT_MOST, UP, DOWN = 0, 9, 1, 2, 3
 
 Moment = Sequence[float]
-"""Time in s, rising; then of each of two axes its demand, part of full speed, and its speed."""
+"""Time in s, rising; then of each axis its demand, part of full speed, and its speed."""
 
 Drives = Sequence[Sequence[Moment]]
 Mean = tuple[float, float]
@@ -67,15 +67,15 @@ Seen = Mapping[tuple[int, ...], tuple[Bins, Bins]]
 
 
 def measured(drives: Drives, axes: Sequence[str], shares: Mapping[str, float]) -> list[PumpFlow]:
-    """Measure the flow of the pump for each pair of directions, sorted by flow, least first.
+    """Measure the flow for each pair of directions with enough data, the least flow first.
 
     Args:
-        drives: of each axis alone, and of both at once.
-        axes: the two.
+        drives: moments of each axis alone, and of both at once.
+        axes: names of the two.
         shares: what each takes at full speed, full axis flows.
 
     Raises:
-        CalibrationError: a drive is missing, or they show nothing.
+        CalibrationError: a drive is missing, or shows no steady speed or no flow.
     """
     seen = _seen(drives)
     directions = []
@@ -154,7 +154,7 @@ def _seen(drives: Drives) -> Seen:
 
 
 def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
-    """Return the state of an axis by its demand, and by its demand SLOW_S ago."""
+    """Return the state of an axis by its demand now, SLOW_S ago, and at most in each direction."""
     way, change = 1 if demand > 0.0 else -1, abs(demand) - abs(before)
     if abs(demand) < STANDS:
         return STANDING
@@ -166,7 +166,7 @@ def _state(demand: float, before: float, most: Mapping[int, float]) -> int:
 
 
 def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
-    """Return the two axes that are named, or the first two with a filter; UsageError for others."""
+    """Return the two axes that are named, else the first two with a filter; else UsageError."""
     filtered = [n for n, one in deployment.config.axes.items() if one.filter.kind != "off"]
     names = tuple(dict.fromkeys(axes)) or tuple(filtered[:2])
     if len(names) != 2 or not {*names} <= deployment.axes.keys():
@@ -178,7 +178,7 @@ def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
 def pump_lines(
     deployment: Deployment, axes: Sequence[str], drives: Drives, origin: dict[str, Any] | None
 ) -> list[str]:
-    """Return lines on the pump; write its flow into the file where an origin is given.
+    """Return lines on the pump; with an origin write a flow that is too little for both axes.
 
     Raises:
         CalibrationError: see ``measured``.
@@ -224,10 +224,12 @@ def drives_in(
     speeds: Mapping[str, str],
     channel: str | None,
 ) -> Drives:
-    """Return demands and speeds of two axes out of logs; see ``read_can`` and ``speed_signal``.
+    """Return the moments of two axes in each log; see ``read_can`` and ``speed_signal``.
 
     Raises:
         IdentificationError: commands or speeds of an axis are not in a log.
+        LogError: a log cannot be read.
+        UsageError: no signal with the speed of an axis is known.
     """
     names = {axis: ".".join(speed_signal(deployment, axis, speeds.get(axis))) for axis in axes}
     drives = []

@@ -61,7 +61,7 @@ class Ramp:
         return self.top * (self.up_s + self.hold_s)
 
     def command(self, time_s: float) -> float:
-        """Return the command at a time; 0 before the beginning and after the end."""
+        """Return the command at a time, part of full; 0 before the beginning and after the end."""
         half, into_s = divmod(time_s, self.half_s)
         if half not in (0, 1):
             return 0.0
@@ -70,9 +70,9 @@ class Ramp:
         return min(self.top, max(0.0, min(rising, falling))) * (1.0 if half == 0 else -1.0)
 
     def part(self, time_s: float) -> str:
-        """Return the part of the ramp: settling, rest, up, hold, held or down, and the direction.
+        """Return the part of the ramp: settling, rest, or up, hold, held, down with + or - behind.
 
-        A rest, and the largest command, are measured in their second half, when all has settled.
+        Second halves of a rest (rest) and of the largest command (held) are measured: all settled.
         """
         half, into_s = divmod(time_s, self.half_s)
         if half > 1 or into_s < self.rest_s:
@@ -109,11 +109,11 @@ class EndStopDetector:
         self._moved_s = 0.0
 
     def reached(self, part: str, time_s: float, command: float, speed: float) -> bool:
-        """Take a speed; return whether the axis is at its end.
+        """Take a speed; return whether it has been too slow for its command for ``LASTING_S``.
 
         Args:
             part: of the ramp, as ``Ramp.part`` names it.
-            time_s: of the measurement.
+            time_s: since this run of the ramp began.
             command: of the ramp, part of full.
             speed: of the feedback, in its own unit.
         """
@@ -137,12 +137,11 @@ def speed_signal(deployment: Deployment, axis: str, speed: str | None) -> tuple[
     """Return message and signal with the speed of an axis.
 
     Args:
-        deployment: the machine.
-        axis: name of the axis.
+        deployment, axis: the machine, and the name of its axis.
         speed: MESSAGE.SIGNAL; None for the feedback in the file, else that of the simulated crane.
 
     Raises:
-        UsageError: there is no such axis, or no such signal is known.
+        UsageError: no such axis, no name of that form, or none is known.
     """
     bound = deployment.axes.get(axis)
     if bound is None:
@@ -168,10 +167,8 @@ class SpeedFeedback:
     checksum hold. Any other message has to come on the bus of the valve.
 
     Args:
-        deployment: the machine.
-        axis: name of the axis.
-        message: name of the message.
-        signal: its signal.
+        deployment, axis: the machine, and the name of its axis.
+        message, signal: their names in the DBC.
 
     Raises:
         ConfigError: no such message or signal, or one that cannot be measured with.

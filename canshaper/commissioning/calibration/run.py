@@ -32,15 +32,14 @@ STOPS = [getattr(signal, name) for name in _STOPS if hasattr(signal, name)]
 def run_live(
     drive: CalibrationDrive, deployment: Deployment, on_progress: Callable[[CalibrationDrive], None]
 ) -> None:
-    """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
+    """Drive the axes of the machine until the ramp is over, something stops it, or Ctrl-C.
 
-    It also ends where the ramp cannot begin within ``WAIT_LIMIT_S``. However it ends, the last
-    frames to every valve are neutral.
+    It also ends where the ramp cannot begin within ``WAIT_LIMIT_S``; ``drive.ended`` says why.
+    However it ends, the last frames to every valve are neutral.
 
     Args:
-        drive: the measurement.
-        deployment: its machine.
-        on_progress: called now and then.
+        drive, deployment: the measurement, and its machine.
+        on_progress: called five times a second, and at the end.
 
     Raises:
         BusError: a bus cannot be opened.
@@ -107,12 +106,12 @@ def run_simulated(
     parameters: CraneParameters | None,
     on_progress: Callable[[CalibrationDrive], None],
 ) -> None:
-    """Drive the axes of the simulated crane, with the enable switch held, to the end.
+    """Drive the axes of the simulated crane, with enable held, until ``drive.ended`` says why.
 
-    Before, each axis is driven back until it has room for its ramp.
+    Before, each axis is driven back until it has room for its ramp, at most 30 s.
 
     Raises:
-        ConfigError: the deployment does not fit the machine.
+        ConfigError: the deployment does not fit the simulated machine.
     """
     plant = PlantNode(deployment, parameters)
     for axis in drive.turns[-1]:
@@ -128,7 +127,7 @@ def run_simulated(
 
 
 def _give_room(plant: PlantNode, deployment: Deployment, axis: str, travel_s: float) -> None:
-    """Bring the axis back with its joystick, as a person does on request."""
+    """Drive the axis back by its joystick until it has room for so many seconds of full speed."""
     actuator = plant.crane.boom.axes[deployment.coordinates.get(axis, axis)]
     back = Script("back", (Stroke(axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)

@@ -35,7 +35,6 @@ class Link:
     """A network interface.
 
     Attributes:
-        name: of the interface.
         can: whether it is a CAN interface.
         kind: of its driver: can (a controller), vcan, vxcan; None where it is not known.
         up: whether it is set up.
@@ -43,7 +42,7 @@ class Link:
         queue: length of its transmit queue, frames.
         mtu: bytes of the kernel's frames that it carries: 16 of classical CAN, 72 of CAN FD.
         data: details of a controller, in the words of ``ip``; empty where there are none.
-        counts: its errors since it was set up first.
+        counts: its errors since it was plugged in, by the names of ``ip``.
     """
 
     name: str
@@ -57,7 +56,7 @@ class Link:
     counts: dict[str, int]
 
     def rate(self, timing: str = "bittiming") -> int | None:
-        """Return the bit rate of a timing, bit/s; an adapter without timings reports its rate."""
+        """Return the rate of a timing, bit/s, or of an adapter without timings; None if unknown."""
         rate = self.data.get(timing, {}).get("bitrate", self.data.get(f"{timing}_bitrate"))
         return int(rate) if rate else None
 
@@ -74,7 +73,7 @@ def read_link(name: str, root: Path = Path("/")) -> Link | None:
 
 
 def parse_ip(text: str) -> Link | None:
-    """Return the interface in the output of ``ip -details -statistics -json link show``."""
+    """Return what ``ip -details -statistics -json link show`` printed; None for no interface."""
     try:
         entries = [entry for entry in json.loads(text) if entry.get("ifname")]
     except ValueError:  # an ip without -json
@@ -97,7 +96,7 @@ def parse_ip(text: str) -> Link | None:
 
 
 def read_sys(name: str, root: Path) -> Link | None:
-    """Return an interface as /sys/class/net shows it, without details of its controller."""
+    """Return an interface as /sys/class/net shows it, without its controller; None for none."""
     directory = root / "sys/class/net" / name
     try:
         texts = {f: (directory / f).read_text().strip() for f in SYS_FILES}
@@ -129,10 +128,9 @@ def device_findings(
     Without such an interface there is no finding.
 
     Args:
-        name: of the bus in the deployment file.
-        bus: its section.
+        name, bus: of the bus in the deployment file, and its section.
         root: of the file system.
-        query_kernel: for kind and bit rates of the interface with an index.
+        query_kernel: asks for kind and bit rates of the interface with an index.
     """
     subject = f"{bus.channel} device"
     try:
@@ -154,11 +152,10 @@ def device_findings(
 
 
 def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
-    """Return lines to paste: ``match`` for the deployment file, a name for networkd and udev.
+    """Return lines to paste: ``match`` for the file; with serial or path files that name it too.
 
     Args:
-        name: of the bus in the deployment file.
-        device: its device now.
+        name, device: of the bus in the deployment file, and its device now.
         root: of the file system.
     """
     match: dict[str, str | int | None] = {"driver": device.driver}

@@ -22,8 +22,7 @@ def adapter_findings(name: str, bus: Bus, tick_ms: int) -> Iterator[Finding]:
     """Yield what an interface of python-can can and cannot report.
 
     Args:
-        name: of the bus in the deployment file.
-        bus: its section.
+        name, bus: of the bus in the deployment file, and its section.
         tick_ms: period of the loop.
     """
     subject = f"bus {name} {bus.interface}"
@@ -80,7 +79,7 @@ def kernel_fault() -> OSError | None:
 
 
 def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
-    """Check one interface of a deployment."""
+    """Check the interface of a bus as far as it shows itself; None is a missing one."""
     name = bus.channel
     if link is None:
         remedy = f"plug the adapter in; a virtual bus: sudo ip link add {name} type vcan"
@@ -114,7 +113,7 @@ def up(link: Link, bus: Bus) -> Finding:
 
 
 def echo(link: Link, bus: Bus) -> list[Finding]:
-    """Check that the driver confirms which frames got onto the bus."""
+    """Check that the driver confirms which frames got onto the bus; no finding where it does."""
     if link.echo:
         return []
     text = "none (no echo, as slcan): a cut line to a valve trips no axis; "
@@ -124,7 +123,7 @@ def echo(link: Link, bus: Bus) -> list[Finding]:
 
 
 def bitrate(link: Link, bus: Bus) -> Finding | None:
-    """Check the bit rate against that of the file, where the file has one."""
+    """Check the bit rate against that of the file, where both are known."""
     subject = f"{link.name} bit rate"
     if link.rate() is None:
         return None
@@ -159,7 +158,7 @@ def fd_options(bus: Bus) -> str:
 
 
 def queue(link: Link) -> Finding:
-    """Check the length of the transmit queue: a long one sends old commands."""
+    """Check the transmit queue: a long one sends old commands, a short one has too little room."""
     subject = f"{link.name} queue"
     remedy = f"sudo ip link set {link.name} txqueuelen 16"
     queue = f"{link.queue} frames"

@@ -48,6 +48,8 @@ def listen(
 ) -> dict[str, list[int]]:
     """Listen; return when each message on SocketCAN came, ns, by the names of ``inputs_of``.
 
+    ``on_progress`` is called with the seconds that have passed.
+
     Raises:
         OSError: an interface cannot be opened.
         WrongDeviceError: one is another device than the deployment names.
@@ -81,7 +83,7 @@ def listen(
 
 
 def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
-    """Return the next frame and when the kernel received it, ns; None for no data frame."""
+    """Return the next frame and when the kernel received it, ns; None without data or time."""
     packet, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
     frame, time_ns = frame_of(bus, packet), stamp_ns(ancillary)
     return None if frame is None or time_ns is None else (frame, time_ns)
@@ -136,7 +138,7 @@ class Waving(Script):
     """A script that moves every joystick of any machine without end."""
 
     def command(self, axis: str, time_s: float) -> float:
-        """Return the deflection at a time, the same for all axes."""
+        """Return the deflection at a time, part of full, the same for all axes."""
         stroke, at_s = divmod(time_s, NEUTRAL_S + STROKE_S)
         way = (at_s - NEUTRAL_S) / STROKE_S
         if way <= 0.0:
@@ -146,7 +148,7 @@ class Waving(Script):
 
 
 class Joysticks:
-    """All joysticks of a deployment on sockets that stand for its buses.
+    """All joysticks and the emergency stop of a deployment on sockets that stand for its buses.
 
     Attributes:
         sent: by bus, of each frame in order: number of its joystick in the deployment (-1 of
@@ -195,7 +197,7 @@ class Joysticks:
 
 
 def main(options: dict[str, Any]) -> None:
-    """Send from the first frame that comes until the loop ends; print what was sent when."""
+    """Send from the first frame received until the loop ends; print ``Joysticks.sent``."""
     sockets = {name: socket.socket(fileno=fd) for name, fd in options["sockets"].items()}
     for one in sockets.values():
         one.setblocking(False)

@@ -25,9 +25,8 @@ class WatchedPort(RawPort):
     """A bus on one end of a socket pair; it counts received frames and reports sent ones.
 
     Args:
-        name: of the bus.
-        config: its section.
-        one: the end.
+        name, config: of the bus, and its section.
+        one: its end of the socket pair.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
         fd: identifier, and whether it is extended, of what is sent in frames of CAN FD.
@@ -71,8 +70,8 @@ class Loop:
 
     Args:
         deployment: what is run.
-        sockets: one end of a bus, by its name.
-        seconds: how long.
+        sockets: the loop's end of the socket pair of each bus, by its name.
+        seconds: how long, from the first frame on.
     """
 
     def __init__(
@@ -102,7 +101,7 @@ class Loop:
         self._moved: set[str] = set()
 
     def run(self) -> None:
-        """Run as the daemon does, from the first frame of a joystick on."""
+        """Run as the daemon does, from the first frame of a joystick on; then close the buses."""
         self._collector.freeze()
         say_ready()
         select.select(list(self._ports.values()), [], [])
@@ -138,7 +137,7 @@ class Loop:
         self._collector.pause(now_ns)
 
     def record(self) -> dict[str, Any]:
-        """Return the record of the run: the fields of ``Record``."""
+        """Return the record of the run, of which ``run_of`` makes a ``Run``; times in ns."""
         return {
             "late_ns": list(self._late),
             "began_ns": list(self._began),

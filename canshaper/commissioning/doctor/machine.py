@@ -54,9 +54,7 @@ def machine_findings(tick_ms: int) -> list[Finding]:
 def preemption(root: Path, version: str) -> Finding:
     """Check how soon the kernel lets a real-time process run.
 
-    Args:
-        root: root of the file system.
-        version: the kernel's version text, ``uname -v``.
+    ``version`` is the kernel's version text, ``uname -v``.
     """
     real_time = "linux-image-rt-amd64 or the like of the distribution"
     if re.search(r"PREEMPT[_ ]RT", version) or _read(root / "sys/kernel/realtime") == "1":
@@ -141,7 +139,7 @@ def governor(root: Path) -> Finding:
 
 
 def idle_states(root: Path, tick_ms: int) -> Finding:
-    """Check how long the deepest sleep of a processor takes to wake up from."""
+    """Check which part of a tick the deepest sleep of a processor takes to wake up from."""
     deepest_us, name = 0, ""
     for state in (root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpuidle/state*"):
         latency = _read(state / "latency")
@@ -191,9 +189,7 @@ def suspend(root: Path) -> Finding:
 def virtual(hypervisor: str | None, root: Path) -> Finding:
     """Check whether another system decides when this one runs.
 
-    Args:
-        hypervisor: output of ``systemd-detect-virt --vm``, None where there is no such program.
-        root: root of the file system.
+    ``hypervisor`` is what ``systemd-detect-virt --vm`` says; None where there is no such program.
     """
     if hypervisor is None and re.search(
         r"^flags\b.*\bhypervisor\b", _read(root / "proc/cpuinfo") or "", re.MULTILINE
@@ -224,7 +220,7 @@ def processors(root: Path, number: int) -> Finding:
 
 
 def others(load: float, number: int) -> Finding:
-    """Check which programs ran before the first run: the run called idle includes them.
+    """Check how many processes wanted to run before the first run, whose figures include them.
 
     Args:
         load: processes that ran or waited for a processor, mean of a minute.

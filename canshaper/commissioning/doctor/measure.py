@@ -56,12 +56,12 @@ def measure(
 
     Args:
         deployment: what is run.
-        seconds: how long.
+        seconds: how long it runs.
         on_progress: called with the seconds that have passed.
         load: keep the PC busy meanwhile.
 
     Raises:
-        MeasurementError: a process failed.
+        MeasurementError: a process failed, or did not end in time.
     """
     with Children() as children, ExitStack() as ends:
         loops, joysticks = {}, {}
@@ -112,8 +112,7 @@ def run_of(
 
     Args:
         deployment: what was run.
-        record: output of the loop process.
-        hand: output of the joysticks process.
+        record, hand: output of the processes of loop and joysticks.
     """
     began, ended = record["began_ns"], record["ended_ns"]
     sent = list(zip(*[iter(record["sent"])] * 3, strict=True))  # tick, axis, ns

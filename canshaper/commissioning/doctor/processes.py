@@ -86,7 +86,7 @@ def ready(process: "subprocess.Popen[str]") -> None:
     """Wait until a child prints that it is ready; it prints nothing else before its end.
 
     Raises:
-        MeasurementError: it ended instead.
+        MeasurementError: it failed or ended instead.
     """
     assert process.stdout is not None
     if process.stdout.readline().strip() != READY:
@@ -95,7 +95,7 @@ def ready(process: "subprocess.Popen[str]") -> None:
 
 
 def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
-    """Wait for the end of a child, and return its output.
+    """Wait until a child ends, at most ``limit_s`` (None: for ever); return its output.
 
     Raises:
         MeasurementError: it failed.
@@ -108,7 +108,7 @@ def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
 
 
 def be() -> None:
-    """Run a child: let it end with its parent, then call ``main`` of its module."""
+    """Be the child: end with the parent, and call ``main`` of the module with the options."""
     options: dict[str, Any] = json.loads(sys.argv[1])
     end_with_parent(signal.SIGKILL)
     if os.getppid() != options["parent"]:  # the parent ended before that call

@@ -29,7 +29,7 @@ TIMES = {
 def as_dict(
     deployment: Deployment, seconds: float, runs: dict[str, Run], findings: list[Finding]
 ) -> dict[str, Any]:
-    """Return the report as JSON data; times in microseconds."""
+    """Return the report as JSON data; times of the runs in microseconds."""
     return {
         "file": str(deployment.path),
         "fit": fit(findings),
@@ -83,7 +83,7 @@ def print_report(
 
 
 def _histograms(title: str, series: dict[str, list[int]]) -> Table:
-    """Return histograms side by side, a row for each bin."""
+    """Return histograms of times, ns, by name, side by side: a row for each bin."""
     head = f"{title}, us"
     table = new_table("up to", title=head)
     counts = {name: histogram(times) for name, times in series.items()}
@@ -101,7 +101,7 @@ def _histograms(title: str, series: dict[str, list[int]]) -> Table:
 
 
 def _bar(count: int, most: int) -> str:
-    """Return a bar in eighths of a character; a single count still shows."""
+    """Return a bar, ``BAR`` characters for ``most``, in eighths of one; a count of 1 shows."""
     if count == 0:
         return ""
     eighths = max(round(8 * BAR * count / most), 1)

@@ -15,13 +15,13 @@ from canshaper.machine.joysticks import follow_fault
 
 NS_PER_US = 1000.0
 
-# Upper ends of the bins, us: three in a decade, 1 us to 100 s.
+# Upper ends of the bins, us: three in a decade, 1 us to 50 s.
 ENDS_US = tuple(step * 10**power for power in range(8) for step in (1, 2, 5))
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Quantiles of times, us."""
+    """Number of times, their quantiles and the longest, us."""
 
     count: int
     p50: float
@@ -31,7 +31,7 @@ class Summary:
 
 
 def quantile(ordered: Sequence[int], share: float) -> int:
-    """Return the smallest value that at least this share of all values (in order) keeps to."""
+    """Return the least of the rising values that this share (0 to 1) of them does not exceed."""
     return ordered[max(math.ceil(share * len(ordered)), 1) - 1]
 
 
@@ -47,7 +47,7 @@ def summary(times_ns: Sequence[int]) -> Summary | None:
 def histogram(times_ns: Sequence[int]) -> dict[int, int]:
     """Return the number of times in each bin, by the upper end of the bin in us, included.
 
-    The bins go from the first to the last that is not empty.
+    The bins go from the first to the last that is not empty; the last bin takes longer times too.
     """
     counts = [0] * len(ENDS_US)
     for time_ns in times_ns:
@@ -104,7 +104,7 @@ REAL_TIME = "see kernel, huge pages, governor, idle states and virtual machine b
 
 
 def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Finding]:
-    """Judge all runs, by their names."""
+    """Judge all runs, by their names; priority and memory by the first of them."""
     tick_ns = deployment.config.tick_ms * 1_000_000
     findings = [check(next(iter(runs.values()))) for check in (policy, memory)]
     checks: tuple[Callable[[str, Run, int], Finding], ...] = (lateness, deadlines, processing)
@@ -116,7 +116,7 @@ def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Find
 
 
 def waiting(deployment: Deployment) -> list[Finding]:
-    """Note that joystick frames wait for the tick, where ticks could follow a joystick."""
+    """Note how long joystick frames wait for a tick that could follow them, or that it does."""
     config = deployment.config
     subject = "wait for the tick"
     if config.tick:
@@ -133,7 +133,7 @@ def waiting(deployment: Deployment) -> list[Finding]:
 def _share_finding(
     subject: str, times_ns: list[int], shares: tuple[float, float], tick_ns: int, remedy: str
 ) -> Finding:
-    """Judge the 99.9 % quantile against parts of the tick."""
+    """Judge the 99.9 % quantile: good up to the first share of the tick, bad above the second."""
     at_ns = quantile(sorted(times_ns), 0.999)
     good, worst = shares
     part = at_ns / tick_ns

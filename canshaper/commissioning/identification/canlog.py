@@ -31,7 +31,10 @@ from canshaper.shipped import data_directory
 
 @dataclass
 class _Reader:
-    """Reader of one signal of a log; ``merit`` names the signal of its figure of merit."""
+    """Reader of one signal of a log.
+
+    ``source`` is the address of its sender in J1939, ``merit`` the signal of its figure of merit.
+    """
 
     name: str
     message: Message
@@ -52,7 +55,7 @@ class _Reader:
         self._low, self._high = (low, high) if bounded else (-math.inf, math.inf)
 
     def wants(self, can_id: int, extended: bool) -> bool:
-        """Return whether an identifier is that of the message; of J1939 with any priority."""
+        """Return whether an identifier is the message's; of J1939 by sender, with any priority."""
         own = self.message.frame_id
         if extended != self.message.is_extended_frame:
             return False
@@ -62,7 +65,7 @@ class _Reader:
         return group_of(can_id) == group_of(own) and sender in (NULL, can_id & 0xFF)
 
     def receive(self, time_s: float, sender: tuple[str, int], data: bytes) -> None:
-        """Take a frame that was received."""
+        """Take the value of a frame; count a frame that is too short or has no valid value."""
         self.senders.add(sender)
         if len(data) < self.message.length:
             self.too_short += 1
@@ -113,7 +116,7 @@ def read_can(
     sources: Mapping[str, int | None] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> dict[str, Series]:
-    """Read the signal of each axis from a log.
+    """Read the signal of each axis from a log; of one that is cut off, what is there.
 
     Args:
         path: the log.
@@ -125,8 +128,8 @@ def read_can(
         on_progress: called with the part that is read, 0 to 1.
 
     Raises:
-        IdentificationError: a signal is not in the log, or from two senders.
-        LogError: the log cannot be read.
+        IdentificationError: a signal is wrong (see ``bind``), without a value, or from two senders.
+        LogError: the log cannot be read, or has no frame of the channel.
     """
     axes = deployment.axes.values() if deployment else ()
     merits = {s.name: s.config.merit for one in axes if (s := one.sway_sensor)}
@@ -219,7 +222,7 @@ def _left_out(path: Path, reader: _Reader, seen: Seen, messages: Messages) -> li
 
 
 def messages_of(files: Sequence[Path], deployment: Deployment | None) -> Messages:
-    """Return the messages of DBC files, else of the deployment, else of the forwarder."""
+    """Return the messages of DBC files, else of the deployment, else of the shipped forwarder."""
     if not files and deployment:
         return deployment.messages
     paths = files or [data_directory() / "dbc" / "forwarder.dbc"]

@@ -36,7 +36,7 @@ def series_of(table: Table, column: str | None, about_s: float | None = None) ->
     ``about_s`` is the approximate period, s; None where it is not known.
 
     Raises:
-        IdentificationError: no such column, no gyroscope, or a clock that goes back.
+        IdentificationError: no such column, no gyroscope with numbers, or a clock that goes back.
     """
     if column is not None:
         return _series(table, table.column(column))
@@ -82,7 +82,10 @@ def _series(table: Table, column: str, name: str = "", values: Array | None = No
 
 
 def _direction(columns: Sequence[Series], about_s: float | None) -> tuple[Array, float]:
-    """Return the unit vector of the axis of the swing, and its width by its length, 0 to 1."""
+    """Return the unit vector of the axis of the swing, and its width by its length, 0 to 1.
+
+    Without a free swing these are the column that varies most, and 0.
+    """
     spreads = np.array([float(np.std(one.value)) for one in columns])
     wide = [one for one, s in zip(columns, spreads, strict=True) if s > 0.3 * spreads.max()]
     free = [swings for one in wide if (swings := find_free(one, about_s))]
@@ -124,13 +127,12 @@ _FACTOR = 1.96
 def stopwatch(
     swings: float, seconds: float, first_deg: float, last_deg: float
 ) -> tuple[Value, Value]:
-    """Return the period of small swings, s, and the damping ratio, out of what a person measured.
+    """Return period of small swings, s, and damping ratio, out of what a person measured.
 
     Args:
         swings: full swings (there and back) that were counted.
         seconds: how long they took.
-        first_deg: amplitude at the start, from rest to one side.
-        last_deg: amplitude at the end.
+        first_deg, last_deg: amplitudes at start and end, from rest to one side.
 
     Raises:
         IdentificationError: a number makes no swing, or too few swings were counted.
@@ -158,7 +160,7 @@ def stopwatch(
 
 
 def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str) -> SwingFinding:
-    """Return the finding of a stopwatch."""
+    """Return the finding of numbers for ``stopwatch``, by option; UsageError for None, or a log."""
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
         got = f"none of {', '.join(missing)}" if missing else f"the log {logs[0]}"
@@ -168,7 +170,7 @@ def timed_by_hand(timed: dict[str, float | None], logs: Sequence[str], axis: str
 
 
 def axis_named(axis: str | None, deployment: Deployment | None) -> str:
-    """Return the axis of data that name none: that of --axis."""
+    """Return an axis of the deployment, else UsageError; without deployment any, or "swing"."""
     if deployment is None:
         return axis or UNNAMED
     if axis not in deployment.axes:
@@ -179,7 +181,7 @@ def axis_named(axis: str | None, deployment: Deployment | None) -> str:
 
 
 def signals_named(pairs: Sequence[str], deployment: Deployment | None) -> dict[str, str]:
-    """Return the name of the signal of each axis, out of AXIS=NAME."""
+    """Return the signal of each axis, out of AXIS=NAME; UsageError for another form or a second."""
     signals: dict[str, str] = {}
     for pair in pairs:
         axis, _, name = pair.partition("=")
@@ -202,7 +204,11 @@ def logged(
     channel: str | None = None,
     about_s: float | None = None,
 ) -> list[SwingFinding]:
-    """Return the findings of logs, one for each axis and label; see ``read_can``."""
+    """Return the findings of logs (LOG or LABEL=LOG), one for each axis and label.
+
+    A label that is a number is the load state where the log has none. For the options see
+    ``read_can`` and ``find_free``.
+    """
     if not logs:
         raise UsageError(
             "expected a log or a stopwatch, got neither; see canshaper identify --help"
@@ -235,7 +241,7 @@ def logged(
 
 
 def _slower_s(deployment: Deployment | None, axis: str) -> float | None:
-    """Return the period in the file where its filter covers a second mode, which may swing too."""
+    """Return the file's period, s, where its filter covers a second mode, which may swing too."""
     bound = deployment.axes.get(axis) if deployment else None
     design = bound.config.filter.design() if bound else None
     sway = bound.config.sway if bound and design and design.second else None

@@ -81,7 +81,7 @@ class DecayProblem:
         return np.concatenate(parts)
 
     def solve(self, x: Sequence[float], *, roughly: bool = False) -> Array:
-        """Fit frequency, decay and friction from a start; ``roughly`` to a tolerance of 1e-4."""
+        """Fit parameters from a start, and set amplitudes and weights; ``roughly``: to 1e-4."""
         omega = float(x[0])
         low = np.array([0.6 * omega, -0.2 * omega, -np.inf])[: len(x)]
         high = np.array([1.6 * omega, omega, np.inf])[: len(x)]
@@ -122,8 +122,7 @@ def covariance_of(
 
     Args:
         residual: of all data, one after the other, by the parameters.
-        x: the parameters of the best fit.
-        steps: a small change of each, for the derivative.
+        x, steps: the best parameters, and a small change of each for the derivative.
         data: in the order of the residual.
         omega: frequency of the swing, rad/s.
     """
@@ -142,7 +141,7 @@ def covariance_of(
 
 
 def density(time: Array, residual: Array, omega: float) -> tuple[float, float]:
-    """Return the power of the residual around a frequency, and its degrees of freedom.
+    """Return the power of the residual around a frequency, rad/s, and its degrees of freedom.
 
     The power of white noise is its variance.
     """
@@ -230,12 +229,12 @@ def _covariance(problem: DecayProblem, x: Array) -> tuple[Array, float]:
 
 
 def swing_values(omega: float, sigma: float) -> tuple[float, float]:
-    """Return period and damping ratio of frequency (rad/s) and decay (1/s)."""
+    """Return period (s) and damping ratio of frequency (rad/s) and decay (1/s)."""
     return 2.0 * math.pi / omega, sigma / math.hypot(omega, sigma)
 
 
 def deviations(x: Array, covariance: Array) -> tuple[float, float]:
-    """Return the standard deviations of period and damping ratio."""
+    """Return the deviations of period (s) and damping ratio, by frequency, decay, covariance."""
     omega, sigma = float(x[0]), float(x[1])
     cube = math.hypot(omega, sigma) ** 3
     slopes = np.array([[-2.0 * math.pi / omega**2, 0.0], [-sigma * omega / cube, omega**2 / cube]])
@@ -244,7 +243,7 @@ def deviations(x: Array, covariance: Array) -> tuple[float, float]:
 
 
 def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
-    """Return the deviation of the weighted mean as the segments differ; 0 for one segment."""
+    """Return the deviation of the mean of (value, deviation) by how values differ; 0 for one."""
     weights = [1.0 / max(deviation, 1e-9) ** 2 for _, deviation in alone]
     terms = [(w * (value - common)) ** 2 for w, (value, _) in zip(weights, alone, strict=True)]
     count = len(alone)
@@ -252,7 +251,7 @@ def _between(alone: Sequence[tuple[float, float]], common: float) -> float:
 
 
 def _friction(problem: DecayProblem, x: Array) -> tuple[Damping, Damping] | None:
-    """Return the damping at largest and smallest amplitude, where it surely differs."""
+    """Return the damping at largest and smallest amplitude where it surely differs, else None."""
     if len({s.kind for s in problem.segments}) > 1:
         return None
     ends = [float(problem.basis(i, x)[1][-1]) * a for i, a in enumerate(problem.amplitudes)]

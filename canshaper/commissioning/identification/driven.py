@@ -59,13 +59,13 @@ MODEL_PERIOD, MODEL_RATIO_ABS = 0.013, 0.009
 
 @dataclass(frozen=True, slots=True)
 class Driven(Segment):
-    """One stretch: its data, and the commands that drove it, on the clock of the log."""
+    """One stretch: its data, timed from its start; the commands that drove it, timed by the log."""
 
     command: Command
 
 
 class Stretch(NamedTuple):
-    """A stretch of driving, its fitted swing, and the commanded speed at its times."""
+    """A stretch, its fitted swing, and the delayed command at its times, part of full speed."""
 
     data: Driven
     fitted: Array
@@ -85,7 +85,7 @@ class DrivenFit:
 
 
 def stretches(series: Series, period: float) -> list[Driven]:
-    """Return the stretches with commands, each with some periods before and after them."""
+    """Return the driven stretches with some periods around them; those with gaps are left out."""
     command = series.command
     if command is None or not len(command.time_s):
         return []
@@ -118,7 +118,7 @@ def stretches(series: Series, period: float) -> list[Driven]:
 def swing_filter(
     omega: float, sigma: float, lag: float, kind: Kind, step_s: float = BIN_S
 ) -> tuple[Array, Array]:
-    """Return b and a (of z^-1) of the filter from commanded speed to swing, zero-order hold.
+    """Return b and a (of z^-1) of the filter from speed, m/s, to swing, zero-order hold.
 
     They come from partial fractions of the step response: a matrix exponential would take most of
     the solver's time. The three poles always differ: one is real, two are complex.
@@ -140,7 +140,6 @@ class DrivenProblem:
     """Least squares over the model of a driven swing, whose linear parameters are eliminated.
 
     Attributes:
-        data: the stretches.
         model: returns for each stretch, by the parameters, its swing at 1 m/s full speed, and the
             columns of its free swing and offset.
         low, high, scale: bounds of the parameters, and the size of a step of each.
@@ -169,7 +168,7 @@ class DrivenProblem:
         return pairs
 
     def residual(self, x: Array, gain: float | None = None) -> Array:
-        """Return the residual of all data, with the best gain or a given one."""
+        """Return the residual of all data, with a given full speed (gain, m/s) or the best one."""
         projected = self.projected(x)
         gain = gain_of(projected) if gain is None else gain
         return np.concatenate([y - gain * h for h, y in projected])
@@ -194,7 +193,7 @@ class DrivenProblem:
 
 
 def gain_of(projected: Sequence[tuple[Array, Array]]) -> float:
-    """Return the full speed of least squares, with the sign of the sensor."""
+    """Return the best full speed, m/s with the sensor's sign, of (swing, data) of each stretch."""
     square = sum(float(h @ h) for h, _ in projected)
     return sum(float(h @ y) for h, y in projected) / max(square, 1e-30)
 
@@ -202,7 +201,7 @@ def gain_of(projected: Sequence[tuple[Array, Array]]) -> float:
 def fit_driven(
     series: Sequence[Series], periods: Sequence[float], free: DecayFit | None
 ) -> DrivenFit | None:
-    """Fit the driven swing of an axis; None where no axis was driven, or no command is known.
+    """Fit the driven swing of an axis; None where it was not driven, or no command is known.
 
     Args:
         series: its signals, of which those count that have commands.
@@ -285,7 +284,7 @@ def _result(problem: DrivenProblem, x: Array, free: DecayFit | None) -> DrivenFi
 
 
 def _gain_deviation(problem: DrivenProblem, x: Array, gain: float, omega: float) -> float:
-    """Return the deviation of the gain: by the noise or by the stretches, the larger one."""
+    """Return the deviation of the gain, m/s: by noise or by the stretches, the larger one."""
     one, data = np.array([gain]), problem.data
     noise, _ = covariance_of(lambda g: problem.residual(x, g[0]), one, np.ones(1), data, omega)
     pairs = problem.projected(x)

@@ -101,7 +101,7 @@ def _values(finding: SwingFinding, speed_m_s: float | None) -> SwayNumbers:
 
 
 def _middle(values: Sequence[SwayNumbers]) -> tuple[SwayNumbers, float]:
-    """Return the mean sway of several findings, and how far their lengths are from it, +- %."""
+    """Return the sway of the middle length of findings, and how far lengths are from it, +- %."""
     lengths = [v["period_s"] ** 2 for v in values]
     low, high = min(lengths), max(lengths)
     ratio = sum(v["damping_ratio"] for v in values) / len(values)
@@ -122,7 +122,7 @@ def headlines(findings: Sequence[SwingFinding], advice: Sequence[Advice]) -> lis
 
 
 def lines(finding: SwingFinding) -> list[str]:
-    """Return the lines of a finding: its numbers, and the data that they rest on."""
+    """Return the lines of a finding: its numbers, the data that they rest on, remarks."""
     texts = [heading(finding)]
     if (fit := finding.free) is not None:
         first = max(float(s.envelope[0]) for s in fit.segments)
@@ -146,7 +146,7 @@ def lines(finding: SwingFinding) -> list[str]:
 
 
 def heading(finding: SwingFinding) -> str:
-    """Return name and numbers of a finding: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
+    """Return name and numbers of a finding, if any: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
     name = axis_title(finding.axis) + (f", {finding.label}" if finding.label else "")
     if finding.period_s is None or finding.damping_ratio is None:
         return f"{name}: nothing found"
@@ -217,7 +217,7 @@ def write_sway(
     advice: Sequence[Advice],
     origin: dict[str, Any],
 ) -> list[str]:
-    """Write the sway data of each axis with their origin; return the axes that were written.
+    """Write the sway data and origin of each axis whose findings are all usable; return these.
 
     Raises:
         UsageError: an axis has no section for it, follows its rope, or would travel on for too

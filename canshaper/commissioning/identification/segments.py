@@ -109,7 +109,7 @@ def _smoothed(time: Array, value: Array, period: float) -> tuple[Array, Array]:
 
 
 def _candidates(time: Array, value: Array, about_s: float | None) -> list[float]:
-    """Return the periods, s, at which a signal swings most, the strongest first."""
+    """Return up to four periods, s, at which a signal swings most, the strongest first."""
     low, high = (0.7 * about_s, 1.4 * about_s) if about_s else (SHORTEST_S, LONGEST_S)
     frequencies = np.geomspace(1.0 / high, 1.0 / low, 160)
     power = np.zeros_like(frequencies)
@@ -136,7 +136,7 @@ def _candidates(time: Array, value: Array, about_s: float | None) -> list[float]
 def _with_period(
     signal: Segment, idle: list[Span], period: float, least: float
 ) -> FreeSwings | None:
-    """Return the free swings of about that period, each of at least this worth."""
+    """Return the free swings of about that period, each of at least this worth; None for none."""
     time = signal.time_s
     unbroken = [(float(t[0]), float(t[-1])) for t in (time[p] for p in pieces(time, period / 3.0))]
     wholes = [cut(signal, begin, end, 0.0) for begin, end in common(unbroken, idle)]

@@ -50,14 +50,14 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A number with its confidence interval: ``value`` +- ``half``."""
+    """A number with its interval of 95 %: ``value`` +- ``half``."""
 
     value: float
     half: float
 
     @property
     def relative(self) -> float:
-        """Half width as a part of the value."""
+        """Half width as a part of the value; infinite for a value of 0."""
         return self.half / abs(self.value) if self.value else math.inf
 
 
@@ -83,7 +83,7 @@ _ACCELERATION = re.compile(r"m\s*/\s*s\s*(\^?2|²|/s)|m\s*s-2|m?g", re.IGNORECAS
 
 
 def unit_of(text: str) -> Unit:
-    """Return the unit with this name.
+    """Return the unit with this name; one that is not known is of ``Kind.OTHER``.
 
     Raises:
         IdentificationError: it is that of an acceleration, which does not show a swing.
@@ -152,10 +152,10 @@ class Segment:
 
 
 def ordered(source: str, time_s: Array, value: Array) -> tuple[Array, Array]:
-    """Return times, s, and values in order, numbers only; ``source`` is file and signal.
+    """Return times, s, and values by rising time, numbers only; ``source`` is file and signal.
 
     Raises:
-        IdentificationError: the time goes back: two clocks or two recordings in one file.
+        IdentificationError: the time goes back by over .1 s: two clocks or recordings in one file.
     """
     good = np.isfinite(value) & np.isfinite(time_s)
     time_s, value = time_s[good], value[good]
@@ -174,7 +174,7 @@ def ordered(source: str, time_s: Array, value: Array) -> tuple[Array, Array]:
 
 
 def binned(time_s: Array, value: Array) -> tuple[Array, Array]:
-    """Return the means of times and values in bins that have samples; times rise strictly."""
+    """Return means of times and values in bins of ``BIN_S`` with samples; times rise strictly."""
     if not len(time_s):
         return time_s, value
     number = np.floor((time_s - time_s[0]) / BIN_S + 1e-6).astype(np.int64)
@@ -184,7 +184,7 @@ def binned(time_s: Array, value: Array) -> tuple[Array, Array]:
 
 
 def pieces(time_s: Array, gap_s: float) -> list[slice]:
-    """Return the stretches without a gap longer than ``gap_s``."""
+    """Return the stretches of two or more times without a gap longer than ``gap_s``."""
     near = np.diff(time_s) <= gap_s
     return [slice(a, b + 1) for a, b in runs(np.append(near, False))]
 
@@ -246,7 +246,7 @@ class Commands:
         self._finder = InputFinder(deployment.config.buses if deployment else {}, joysticks)
 
     def receive(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
-        """Take a frame that was received."""
+        """Take what a frame commands, if anything; ``key``: identifier, and whether extended."""
         for axis, layout in self._by_valve.get(key, ()):
             if (part := valve_part(axis, layout, data)) is not None:
                 self._valves[axis.name].add(time_s, self._limits[axis.name].velocity(part))
@@ -257,7 +257,7 @@ class Commands:
                     self._joysticks[name].add(time_s, value if moved else 0.0)
 
     def of(self, axis: str) -> Command | None:
-        """Return the commands of an axis; None where the log has none."""
+        """Return the commands of an axis, by its valve, else its joystick; None for no command."""
         return self._first(axis, self._valves, self._joysticks)
 
     @staticmethod
@@ -274,7 +274,7 @@ class Commands:
         return [span for c in others if c for span in _known(c, np.abs(c.speed) >= STANDS)]
 
     def idle(self) -> list[Span] | None:
-        """Return the stretches in which every axis stands; None where the log has no command."""
+        """Return the stretches in which every axis with commands stands; None for no commands."""
         known = [c for c in map(self.of, self._axes) if c]
         if not known:
             return None
@@ -285,7 +285,7 @@ class Commands:
 
 
 def _known(command: Command, is_so: NDArray[np.bool_]) -> list[Span]:
-    """Return the stretches in which the flags are set and the next command comes soon."""
+    """Return the stretches in which the flags are set and the next command comes within 2 s."""
     time = command.time_s
     known = is_so[:-1] & (np.diff(time) < _SILENT_S)
     return [(float(time[a]), float(time[b])) for a, b in runs(known)]

@@ -21,7 +21,7 @@ ROUGHEST_IN_NOISE = 0.35
 
 
 class Run(NamedTuple):
-    """Windows in a row that may swing freely; worth is the energy of the swing times its time."""
+    """Windows in a row that may swing freely; other fields as of ``Swing``."""
 
     start_s: float
     end_s: float
@@ -94,7 +94,7 @@ def _tolerance(noise: Array, width: int) -> float:
 
 
 def moving_amplitude(residual: Array, time: Array, omega: float) -> float:
-    """Return the amplitude of a residual at a frequency, root mean square over windows."""
+    """Return the amplitude of a residual at a frequency, rad/s, root mean square over periods."""
     wave = residual * np.exp(-1j * omega * time)
     width = max(1, round(2.0 * math.pi / omega / float(np.median(np.diff(time)))))
     if len(wave) < width:
@@ -110,7 +110,7 @@ def _solved(segment: Segment, omega: float, sigma: float) -> tuple[DecayProblem,
 
 
 def cut(whole: Segment, first: float, last: float, start: float | None = None) -> Segment:
-    """Return a part of a segment; its times count from its own start, or from another."""
+    """Return a segment from first to last, s; its times count from its own start, or another."""
     inside = (whole.time_s >= first) & (whole.time_s <= last)
     time = whole.time_s[inside]
     if start is None:
@@ -143,7 +143,7 @@ def clipped(series: Series, fit: DecayFit | None) -> str | None:
 
 
 def mixed(fit: DecayFit) -> str | None:
-    """Return the fault of a longest segment with two swings of different periods; else None."""
+    """Return the fault where the longest segment has two swings of different periods; else None."""
     longest = max(fit.segments, key=lambda s: float(s.segment.time_s[-1]) * float(s.envelope[0]))
     segment = longest.segment
     time, omega = segment.time_s, 2.0 * math.pi / fit.period_s.value

@@ -75,7 +75,7 @@ class Table:
         )
 
     def gyroscope(self) -> list[str]:
-        """Return the columns of a gyroscope, without that of its absolute value."""
+        """Return the columns of a gyroscope, or x, y, z of a file named so; no absolute value."""
         names = [n for n in self.columns if _GYRO.search(n)]
         if not names and _GYRO.search(self.path.stem):
             names = [n for n in self.columns if re.fullmatch(r"[xyz]", n, re.IGNORECASE)]
@@ -86,7 +86,7 @@ def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -
     """Read a table; ``on_progress`` is called with the part that is read, 0 to 1.
 
     Raises:
-        IdentificationError: it is none, or has no times.
+        IdentificationError: it is none, has no times, or too many wrong lines.
         OSError: it cannot be read.
     """
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
@@ -141,7 +141,7 @@ def _row(path: Path, number: int, line: str, delimiter: str) -> list[str]:
 
 
 def _numbers(row: list[str], delimiter: str) -> list[float] | None:
-    """Return the numbers of a line, NaN for an empty field; None where a field is no number."""
+    """Return the numbers of a line, NaN for an empty field; None where one is none or too large."""
     if delimiter != ",":
         row = [f.replace(",", ".") for f in row]
     try:
@@ -152,7 +152,7 @@ def _numbers(row: list[str], delimiter: str) -> list[float] | None:
 
 
 def _left_out(path: Path, width: int, lines: Array, wrong: list[int]) -> list[str]:
-    """Return notes on lines that are no numbers, of which there may be few."""
+    """Return notes on wrong lines; IdentificationError for more than a few, or no others."""
     count, bad = len(lines), len(wrong)
     if bad * _WRONG_LINES > count + _WRONG_LINES:
         text = f"expected {width} numbers a line, got {bad} lines of {count + bad} without"

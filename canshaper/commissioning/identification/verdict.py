@@ -42,7 +42,6 @@ class AxisFinding:
     """Finding of a measurement of one axis.
 
     Attributes:
-        axis: name of the axis.
         problems: why nothing of it may be used, each with what to do; empty where it may be used.
         notes: what else a person should know.
     """
@@ -88,7 +87,7 @@ class SwingFinding(AxisFinding):
 def identify(
     axis: str, label: str, series: Sequence[Series], about_s: float | None = None
 ) -> SwingFinding:
-    """Return period, damping and full speed of an axis, of its signals in one state of the grapple.
+    """Return the finding of an axis, of its signals in one state of the grapple.
 
     ``about_s`` is the approximate period, s; None where it is not known.
     """
@@ -182,7 +181,7 @@ def _driven(finding: SwingFinding, series: Sequence[Series], about_s: float | No
 
 
 def _second(first: DecayFit, series: Sequence[Series]) -> list[str]:
-    """Return a note on a quicker swing in the residual of the first one."""
+    """Return a note on a quicker swing in the residual of the first one, if there is one."""
     omega = 2.0 * math.pi / first.period_s.value
     x = np.array([omega, omega * first.damping_ratio.value])
     best: FreeSwings | None = None
@@ -216,7 +215,7 @@ def _second(first: DecayFit, series: Sequence[Series]) -> list[str]:
 
 
 def _doubts(fit: DecayFit, *, usable: bool) -> list[str]:
-    """Return notes where damping or period hold for some of the swings only."""
+    """Return notes where damping differs between swings, or some are too large for the model."""
     notes = []
     if fit.friction and usable:
         (large, at_large), (small, at_small) = fit.friction

@@ -39,7 +39,7 @@ class Ear:
         self._again_s = 0.0
 
     def listen(self, timeout_s: float) -> None:
-        """Receive waiting frames; wait for no longer than the timeout."""
+        """Receive waiting frames, or try a lost bus again; wait for no longer than the timeout."""
         if self._listener is None:
             self._reopen(timeout_s)
             return
@@ -78,10 +78,8 @@ def run_live(
     """Draw the state of the machine until a person ends it.
 
     Args:
-        deployment: the machine.
-        console: the terminal.
-        rate_hz: how often.
-        going: whether to go on.
+        deployment, console: the machine and the terminal.
+        rate_hz, going: how often it is drawn, and whether to go on.
 
     Raises:
         BusError: a bus cannot be opened.

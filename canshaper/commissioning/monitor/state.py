@@ -34,8 +34,7 @@ class MessageRate:
     """How often one message of the deployment comes.
 
     Attributes:
-        name: of the message, in the DBC.
-        cycle_ms: its cycle there; None without one.
+        cycle_ms: its cycle in the DBC; None without one.
         last_ns: when it came last; None before.
     """
 
@@ -61,7 +60,7 @@ class MessageRate:
         return len(self.times) * 1e9 / WINDOW_NS
 
     def silent_s(self, now_ns: int) -> float | None:
-        """Return for how long the message is missing; None where it is not."""
+        """Return for how long the message is missing, s; None where it is not, or never came."""
         if self.last_ns is None:
             return None
         limit_ns = LATE_NS
@@ -74,15 +73,12 @@ class MessageRate:
 class Monitor:
     """State of a machine, from every frame that is received.
 
-    Args:
-        deployment: the machine.
-
     Attributes:
         history: of the status messages.
         messages: rate of each message of the deployment, by bus, id and whether that is extended.
         digest: what the daemon says that it runs; None before it says it.
         events: what changed lately, oldest first.
-        others: frames that are no classical data frames, by kind.
+        others: number of frames that are no data frames of classical CAN, by kind.
         samples: of the last status messages of each axis.
     """
 
@@ -111,7 +107,7 @@ class Monitor:
             self.messages.setdefault(message.key, MessageRate(dbc.name, dbc.cycle_time))
 
     def receive(self, frame: ReceivedFrame) -> None:
-        """Take a frame that was received."""
+        """Take a frame into rates, history, samples and events; one of another kind is counted."""
         self._buses[frame.bus].received(frame.time_ns)
         if frame.kind:
             self.others[frame.kind] += 1
@@ -133,7 +129,7 @@ class Monitor:
         changes.clear()  # for a day there are many
 
     def _compare_identity(self, digest: int, time_ns: int) -> None:
-        """Note whether the daemon runs the files and the program that are here."""
+        """Note a new digest of the daemon, and whether it is that of files and program here."""
         if digest == self.digest:
             return
         self.digest, ours = digest, self.deployment.identity.digest
@@ -154,7 +150,7 @@ class Monitor:
         return self.messages[bound.message.key].silent_s(now_ns) if bound else None
 
     def counters_stale_s(self, now_ns: int) -> float | None:
-        """Return for how long the service's counters are missing; None where they are not."""
+        """Return for how long the service's counters are missing; None as of ``stale_s``."""
         status = self.deployment.status
         return self.messages[status.message.key].silent_s(now_ns) if status else None
 
@@ -238,7 +234,7 @@ def line_over_time(
     Args:
         values: time in ns, and a value of -1 to 1, which is the whole height.
         now_ns: the right edge.
-        columns: of the line; each shows the largest value of its time.
+        columns: of the line; each shows the value of its time that is farthest from 0.
         plain: only characters of ASCII.
     """
     levels = PLAIN_LEVELS if plain else LEVELS

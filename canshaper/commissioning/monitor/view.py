@@ -27,7 +27,7 @@ class Keys:
     Attributes:
         paused: whether the picture stands still; listening goes on.
         axis: the only one that is shown; None for all.
-        ended: whether it is enough.
+        ended: whether the person ends the monitor.
     """
 
     def __init__(self, axes: Sequence[str]) -> None:
@@ -37,7 +37,7 @@ class Keys:
         self.ended = False
 
     def press(self, pressed: str) -> None:
-        """Take keys, in order; others do nothing."""
+        """Take keys: p or space pauses, a shows the next axis, q ends; others do nothing."""
         for key in pressed:
             if key in "p ":
                 self.paused = not self.paused
@@ -96,10 +96,8 @@ def screen(
     """Return the whole state at a moment, in as many lines as the terminal has.
 
     Args:
-        monitor: what is known.
-        now_ns: wall clock.
-        width: columns of the terminal.
-        height: its lines.
+        monitor, now_ns: what is known, and the wall clock.
+        width, height: columns and lines of the terminal.
         plain: only characters of ASCII.
         keys: what a person has chosen; None where no key can come.
     """

@@ -31,9 +31,6 @@ _VARIABLES = (0x2, 0x7)  # DOMAIN, VAR
 class Eds:
     """An EDS or DCF file.
 
-    Args:
-        path: an EDS or DCF.
-
     Attributes:
         node: node id of a DCF; None where it has none.
 
@@ -107,7 +104,7 @@ class Eds:
         return ConfigError([self.problem(section, text)])
 
     def _not_one(self, error: configparser.Error) -> ConfigError:
-        """Return why the file has no sections, with the line."""
+        """Return the error of a file that is not made of sections, with the line."""
         several = getattr(error, "errors", ())  # of a ParsingError, with their lines
         line = several[0][0] if several else getattr(error, "lineno", None)
         got = self._text.splitlines()[line - 1].strip()[:40] if line else "another"
@@ -115,7 +112,7 @@ class Eds:
         return ConfigError([Problem(str(self.path), line, "", f"{text}, got {got!r}")])
 
     def _check(self, section: str) -> None:
-        """Check what canopen would report with an error that names no section."""
+        """Raise ConfigError for what canopen would report without its section."""
         match = _OBJECT.fullmatch(section)
         assert match
         options = self._file[section]
@@ -140,7 +137,7 @@ class Eds:
 
 
 def _canonical(file: configparser.RawConfigParser) -> configparser.RawConfigParser:
-    """Return the file with sections and keys as the standard writes them, without empty ones."""
+    """Return the file with sections and keys in the standard's spelling, without empty numbers."""
     result = configparser.RawConfigParser()
     result.optionxform = str  # type: ignore[method-assign,assignment]
     for section in file.sections():

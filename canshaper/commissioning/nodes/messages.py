@@ -25,7 +25,7 @@ _BYTE = (8, 16, 32)
 
 
 def bytes_of(node: Node) -> dict[str, bool]:
-    """Return the objects that a node sends that may be switches, and whether they are."""
+    """Return labels of bytes and words that a node sends; True for switches by its profile."""
     digital_by_name = {}
     for pdo in node.pdos:
         for one, name in zip(pdo.objects, labels(pdo.objects), strict=True):
@@ -54,7 +54,7 @@ def message_name(node: str, pdo: Pdo) -> str:
 
 
 def dbc(all_messages: Sequence[Message]) -> str:
-    """Return the text of a DBC file."""
+    """Return the text of a DBC file with these messages."""
     senders = dict.fromkeys([_OURS, *(sender for m in all_messages for sender in m.senders)])
     text = Database([*all_messages], [Sender(name, None) for name in senders]).as_dbc_string()
     return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
@@ -113,14 +113,14 @@ def _signals(node: Node, one: Mapped, name: str, receiver: str, *, split: bool) 
 
 
 def labels(objects: Sequence[Mapped]) -> list[str]:
-    """Return a unique name for each object: its own, else with its parent's, else numbered."""
+    """Return a name of each object, unique in the PDO: its own, with its parent's, or numbered."""
     own = [_word(one.name) for one in objects]
     longer = [_word(f"{one.parent} {one.name}") for one in objects]
     once, once_longer = Counter(own), Counter(longer)
     names: list[str] = []
     for number, (short, long) in enumerate(zip(own, longer, strict=True), 1):
         label = short if once[short] == 1 else long
-        unique = once[short] == 1 or once_longer[long] == 1
+        unique = once[short] == 1 or (once_longer[long] == 1 and once[long] != 1)
         names.append(label if unique else f"{label[: _LETTERS - 3]}_{number}")
     return names
 

@@ -86,8 +86,6 @@ class Node:
         node: its node id.
 
     Attributes:
-        id: its node id.
-        objects: its object dictionary.
         profile: number of its device profile, such as 401; 0 for none.
         pdos: those that can be used, RPDOs first.
         left_out: those without identifier or objects, and where that stands.

@@ -76,11 +76,10 @@ def heartbeat_ms(node: Node) -> int | None:
 
 
 def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, MessageTiming]]) -> list[Parameter]:
-    """Return the parameters to set in a node, in this order.
+    """Return the parameters to change in a node, in this order; last one that stores them.
 
     Args:
-        name: its name.
-        node: the node, as its EDS has it.
+        name, node: its name, and the node as its EDS has it.
         used: its PDOs that the deployment uses.
     """
     needed = [*_services(node), *(one for pdo, use in used for one in _of_pdo(node, pdo, use))]
@@ -138,7 +137,7 @@ def _of_pdo(node: Node, pdo: Pdo, use: MessageTiming) -> Iterator[_Setting]:
 
 
 def write(bus: Bus, nodes: Mapping[str, Node], parameters: Sequence[Parameter]) -> Iterator[str]:
-    """Set parameters one after the other, each read before and after; yield what was done.
+    """Set parameters that differ, one after the other, and read them again; yield what was done.
 
     Raises:
         BusError: the bus cannot be opened.

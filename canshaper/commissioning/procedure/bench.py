@@ -105,7 +105,7 @@ class Mode(Enum):
     """Who moves the valves while a step listens."""
 
     LISTEN = "listen"
-    """The person who moves them, without us."""
+    """The person, without us."""
     DRY = "dry"
     """The person moves them without us; the daemon computes, and sends no valve frame."""
     RAW = "raw"
@@ -163,13 +163,14 @@ class Bench(Protocol):
         Raises:
             BusError: a bus cannot be opened.
             OSError: the log cannot be written.
+            UsageError: the daemon ended by itself.
         """
 
     def raw_mode(self, step: str) -> Mode:
-        """Return who moves the valves without filters before the first motion."""
+        """Return who moves the valves, without filters, in a step; at a machine ask the person."""
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:
-        """Drive an axis through its ramp; its valve is neutral afterwards, however it ends.
+        """Drive axes through their ramp until ``drive.ended``; every valve is neutral afterwards.
 
         Args:
             deployment: the machine.
@@ -209,11 +210,11 @@ class Simulated:
         self.changes = changes
 
     def parameters(self, deployment: Deployment) -> CraneParameters:
-        """Return the crane of this file."""
+        """Return the parameters of the simulated crane for this file, with ``changes``."""
         return changed_parameters(self.changes, deployment)
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
-        """See ``Bench``."""
+        """Drive the script of the task; valves stay neutral where its mode is not to move them."""
         with self.person.progress("driving") as on_progress:
             log_simulated(
                 log,
@@ -226,11 +227,11 @@ class Simulated:
             )
 
     def raw_mode(self, _step: str) -> Mode:
-        """See ``Bench``."""
+        """Return that we move the valves; nobody is asked."""
         return Mode.RAW
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, _words: str) -> None:
-        """See ``Bench``."""
+        """Drive axes through the ramp as ``run_simulated`` does; nobody is asked."""
         with self.person.progress("driving") as on_progress:
             parameters = self.parameters(deployment)
             run_simulated(drive, deployment, parameters, lambda one: on_progress(one.progress))

@@ -37,7 +37,7 @@ class Machine:
         self._options = options
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
-        """See ``Bench``."""
+        """Run the daemon where the mode has one; ask the person to drive, and record the buses."""
         with self._daemon(deployment, log, task.mode) as daemon:
             self.person.ready(task.words)
             seconds = task.script.duration_s
@@ -53,13 +53,13 @@ class Machine:
                 raise _failed(daemon, log.with_suffix(".txt"))
 
     def raw_mode(self, step: str) -> Mode:
-        """See ``Bench``."""
+        """Ask the person whether the controller of before moves the valves, or we."""
         question = f"{step}: who moves the valves: {OTHER} (the controller of before) or {OURS}"
         answer = self.person.answer(question, OTHER, (OTHER, OURS))
         return Mode.RAW if answer == OURS else Mode.LISTEN
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:
-        """See ``Bench``."""
+        """Ask the person to be ready, then drive; raise KeyboardInterrupt after a Ctrl-C."""
         self.person.ready(words)
         with self.person.progress("driving") as on_progress:
 

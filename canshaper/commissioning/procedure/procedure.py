@@ -58,7 +58,6 @@ class Procedure:
         origin: the file that a rehearsal's is a copy of.
 
     Attributes:
-        files: as above.
         state: how far it has come.
         news: what a person has to know before the next step.
 
@@ -122,9 +121,10 @@ class Procedure:
     # -- one step ------------------------------------------------------------------------------
 
     def run(self, step: Step) -> Outcome:
-        """Run a step; return its results and what it would write. Nothing is written yet.
+        """Run a step; return its results and what it would write into the deployment file.
 
-        Missing data is no error but a problem of the outcome.
+        Only logs, pictures and the state are written yet; the step is open. Missing data is no
+        error but a problem of the outcome.
 
         Raises:
             ConfigError: the deployment file is no good one.
@@ -153,7 +153,7 @@ class Procedure:
         return outcome
 
     def accept(self, outcome: Outcome) -> None:
-        """Write what a step proposes. It is done; the steps that used its results are open again.
+        """Write what a step proposes; it is done. A change of the file opens the steps that use it.
 
         Raises:
             UsageError: the outcome has problems, or the file was changed meanwhile; the step stays

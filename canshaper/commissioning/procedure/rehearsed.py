@@ -64,7 +64,7 @@ def expected(fault: Fault) -> str:
 
 
 def judged(fault: Fault, report: Mapping[str, Any], deployment: Deployment) -> Row:
-    """Judge what the daemon reports of a fault, see ``Rehearsal``."""
+    """Return the row of a fault, judged by what the daemon reports of it (``Rehearsal``)."""
     claim, reaction, within_ms = fault.claim, reaction_of(fault.claim), fault.within_ns / MS
     events, neutral_ms = report["events"], report["neutral_ms"]
     stops = [event for event in events if event[2] in WORDS_OF]
@@ -116,7 +116,7 @@ def chosen(deployment: Deployment, names: Iterable[str]) -> list[Fault]:
 
 
 def made(control: Path, fault: Fault, deployment: Deployment) -> Row:
-    """Let the daemon make a fault, and wait until it is over; it ends however this returns.
+    """Let the daemon make a fault, wait until it is over, and judge it; it ends in any case.
 
     Raises:
         ControlError: the daemon refuses, or is gone.

@@ -35,7 +35,6 @@ class Record:
     """Record of a step in the state file.
 
     Attributes:
-        status: of the step.
         at: time of the last run, acceptance or skip, ISO 8601; empty before.
         why: why it is open again, or how it was judged.
         parts: lines and tables that it has shown.
@@ -90,7 +89,7 @@ def now() -> str:
 
 
 def stamped(record: Record) -> Record:
-    """Return the record with the time and the program version of now."""
+    """Give the record the time and the program version of now; return it."""
     record.at, record.version = now(), canshaper.__version__
     return record
 

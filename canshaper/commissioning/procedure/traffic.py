@@ -33,7 +33,7 @@ HIGHEST_PART = 1.3
 
 @dataclass
 class AxisTraffic:
-    """One axis.
+    """Traffic of one axis; times from the first frame of the log.
 
     Attributes:
         joystick: its command, [-1, 1].
@@ -55,7 +55,7 @@ class AxisTraffic:
 
 @dataclass
 class Traffic:
-    """A log.
+    """What a log shows.
 
     Attributes:
         duration_s: from the first frame to the last one.
@@ -95,7 +95,7 @@ class _Reader:
         }
 
     def receive(self, frame: Frame, time_ns: int, time_s: float) -> None:
-        """Take a frame that was received."""
+        """Take a frame into ``traffic``."""
         traffic, key = self.traffic, frame[:3]
         traffic.duration_s = time_s
         traffic.frames[key].append(time_s)

@@ -48,7 +48,7 @@ class SensorFit:
         offsets: of each stretch, rad or rad/s.
         fitted: the model, for each stretch.
         square: sum of squares of the data without free swings; ``left``: of its residual.
-        count: measurements.
+        count: number of measurements.
         deviations: standard deviations of delay (s), frequency, decay, and relative of the gain.
     """
 
@@ -64,7 +64,7 @@ class SensorFit:
     deviations: tuple[float, float, float, float]
 
     def explained(self, noise: float) -> float:
-        """Return the part of the signal beyond noise (rad or rad/s) that the commands explain."""
+        """Return the part of a signal beyond noise, rad or rad/s, that commands explain; else 0."""
         beyond = self.square - self.count * noise**2
         return 1.0 - max(0.0, self.left - self.count * noise**2) / beyond if beyond > 0.0 else 0.0
 
@@ -75,7 +75,7 @@ def fit_sensor(data: Sequence[Driven], mode: SwayMode, lag_s: float) -> SensorFi
     Args:
         data: the stretches, of an angle or of a rate; at least one.
         mode: swing by the deployment.
-        lag_s: time constant of the valve.
+        lag_s: time constant of the valve by the deployment.
     """
     pole = mode.pole
     low = [LEAST_DELAY_S, SLOWEST * pole.imag, 0.0]
@@ -102,7 +102,7 @@ def _model(
 
 
 def _held(one: Driven) -> tuple[Array, Array]:
-    """Return a grid of times from the stretch's start, and the commanded speed on it."""
+    """Return a grid of times since the stretch's start, s, and the parts of full speed on it."""
     first, last = float(one.command.time_s[0]) - one.start_s, float(one.time_s[-1])
     grid = np.arange(first, last - LEAST_DELAY_S + GRID_S, GRID_S)
     return grid, one.command.at(one.start_s + grid + 1e-6)
@@ -135,7 +135,7 @@ def _result(problem: DrivenProblem, x: Array) -> SensorFit:
 
 
 def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dict[str, Series]:
-    """Read the measurements of the sensors of some axes.
+    """Read the measurements of some axes' sensors; axes without one are left out.
 
     Raises:
         IdentificationError: a sensor is not in the log, or from two senders.

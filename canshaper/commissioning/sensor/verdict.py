@@ -12,7 +12,7 @@ from canshaper.commissioning.identification.driven import Driven, stretches
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Value
 from canshaper.commissioning.identification.swing import clipped
 from canshaper.commissioning.identification.verdict import AxisFinding
-from canshaper.commissioning.origins import origin_of
+from canshaper.commissioning.origins import confirmed, origin_of
 from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
 from canshaper.edit.edit import Change, FileValue, change, note
 from canshaper.machine.deployment import Deployment
@@ -101,7 +101,7 @@ class SensorFinding(AxisFinding):
 
 
 def examine(axis: BoundAxis, series: Series) -> SensorFinding:
-    """Examine the log of an axis that has a sensor."""
+    """Return the finding on the sensor of an axis, by its signal and commands in a log."""
     assert axis.config.sway and axis.sway_sensor
     finding = SensorFinding(axis.name, series, notes=list(series.notes))
     mode = axis.config.sway.mode()
@@ -150,7 +150,7 @@ def _useless(axis: str, series: Series, period_s: float) -> str | None:
 
 
 def _alone(series: Series, period_s: float) -> list[Series]:
-    """Return the parts of a signal in which no other axis moves, nor did one swing before."""
+    """Return the parts of a signal in which no other axis moves, or did within a period before."""
     command = series.command
     assert command
     parts, begin = [], -math.inf
@@ -166,7 +166,7 @@ def _alone(series: Series, period_s: float) -> list[Series]:
 
 
 def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
-    """Return the standard deviation of neighbours' differences from the model, in their unit."""
+    """Return the deviation of noise, in the data's unit: how residuals .1 s apart differ."""
     squares, count = 0.0, 0
     for one, model in zip(data, fitted, strict=True):
         apart = max(1, round(NOISE_S / float(np.median(np.diff(one.time_s)))))
@@ -214,7 +214,7 @@ def _faults(axis: BoundAxis, finding: SensorFinding) -> list[str]:
 
 
 def changes(axis: BoundAxis, finding: SensorFinding) -> dict[str, FileValue]:
-    """Return the values for the section of the sensor, by key."""
+    """Return values for the section of the sensor, by key; a negative delay shortens its lag."""
     assert axis.sway_sensor
     config = axis.sway_sensor.config
     delay_ms = round(1000.0 * finding.delay_s.value)
@@ -278,8 +278,12 @@ def write_sensors(
     buses = deployment.config.buses.values() if live else ()
     origin = origin_of("sensor", [log] if log else [], deployment.messages, live=buses)
     written: list[Change] = []
+    measured: list[str] = []
     for finding in findings:
         if not finding.problems:
             values = changes(deployment.axes[finding.axis], finding) | {"origin": origin}
             written.append((("axes", finding.axis, "sway_sensor"), values, note("sensor")))
-    return change(deployment.path, written) if written else []
+            measured += (f"axes.{finding.axis}.sway_sensor.{key}" for key in values)
+    if not written:
+        return []
+    return change(deployment.path, [*written, *confirmed(deployment.path, measured)])

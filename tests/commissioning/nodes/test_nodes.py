@@ -10,7 +10,7 @@ import pytest
 
 from canshaper.commissioning.nodes import messages
 from canshaper.commissioning.nodes.eds import Eds
-from canshaper.commissioning.nodes.node import Node
+from canshaper.commissioning.nodes.node import Mapped, Node
 from canshaper.commissioning.nodes.parameters import (
     MessageTiming,
     heartbeat_ms,
@@ -112,6 +112,12 @@ def test_each_bit_of_switches_is_a_signal_and_profiles_give_units(tmp_path: Path
     assert (set_point.minimum, set_point.maximum) == (-16384, 16384)
     slope = messages.messages(node_of(tmp_path, INCLINOMETER), "s", ())[0].signals[0]
     assert (slope.scale, slope.unit, slope.is_signed) == (0.01, "deg", True)
+
+
+def test_a_name_with_its_parents_is_not_the_own_name_of_another() -> None:
+    named = (("Value", "Analogue"), ("Value", "Digital"), ("Analogue value", "Raw"))
+    objects = [Mapped(n, of, 0x2000, 1, 0, 8, False, False, None, None) for n, of in named]
+    assert messages.labels(objects) == ["AnalogueValue_1", "DigitalValue", "AnalogueValue"]
 
 
 def test_a_dcf_has_its_node_id_and_its_values(tmp_path: Path) -> None:

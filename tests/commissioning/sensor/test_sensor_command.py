@@ -8,13 +8,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import can
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
+from canshaper.commissioning.identification.driven import Driven
+from canshaper.commissioning.identification.series import Command, Kind, Series, Unit
 from canshaper.commissioning.procedure.bench import log_simulated
-from canshaper.commissioning.sensor.fit import hand_driven
+from canshaper.commissioning.sensor.fit import SensorFit, hand_driven
+from canshaper.commissioning.sensor.verdict import SensorFinding, write_sensors
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.binding import load_deployment
@@ -93,6 +97,18 @@ def test_without_enough_data_nothing_is_written(tmp_path: Path, file: Path) -> N
     assert "not enough data: expected near_far driven alone for 2 s or more, got 0.0 s" in text
     assert "Picture" not in text
     assert file.read_bytes() == before
+
+
+def test_what_was_measured_is_assumed_no_more(file: Path) -> None:
+    kept, measured = "axes.near_far.sway.period_s", "axes.near_far.sway_sensor.delay_ms"
+    file.write_text(f"{file.read_text()}assumed: [{kept}, {measured}]\n")
+    every = np.arange(100) * 0.02
+    data = Driven("log", 0.0, every, every, Kind.ANGLE, Command(every, every))
+    fit = SensorFit(1.0, 0.04, 2.0, 0.1, np.zeros(1), [every], 1.0, 0.0, 100, (1e-3,) * 4)
+    series = Series("log", Unit(Kind.ANGLE, 1.0, "rad"), every, every)
+    finding = SensorFinding("near_far", series, [data], fit, noise=0.1)
+    write_sensors(load_deployment(file), [finding], None, live=False)
+    assert load_deployment(file).config.assumed == [kept]
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ EVENTS = ("joystick released", "joystick reversed", "joystick lost", "enable los
 
 
 def check_file(context: Context) -> Outcome:
-    """Check the whole file, and propose reduced speed before the first motion."""
+    """Check the whole file; propose reduced speed before the first motion, and guesses to allow."""
     deployment = context.deployment
     outcome = Outcome()
     for name, bus in deployment.config.buses.items():
@@ -124,7 +124,7 @@ HAND_TESTS = (
 
 
 def write_report(context: Context) -> Outcome:
-    """Write what all steps have shown into one file."""
+    """Write what all steps have shown into report.html; print what keeps it from being signed."""
     path = context.folder / "report.html"
     steps = {name: one for name, one in context.state.steps.items() if name != NAME}
     path.write_text(document(context.deployment, context.state, steps, context.folder), "utf-8")
@@ -146,7 +146,7 @@ def write_report(context: Context) -> Outcome:
 
 
 def document(deployment: Deployment, state: State, steps: dict[str, Record], folder: Path) -> str:
-    """Return the whole report.
+    """Return the whole report as HTML.
 
     Args:
         deployment: as it is now.
@@ -213,7 +213,7 @@ def _standing(one: Record) -> str:
 
 
 def _step(name: str, one: Record, folder: Path) -> list[str]:
-    """Return the part of a step: what it has shown, its pictures, and its change of the file."""
+    """Return the HTML of a step: what it has shown, its pictures, and its change of the file."""
     parts = [html.heading(f"{name}: {_standing(one)}")]
     for part in one.parts:
         again = shown(part)
@@ -227,7 +227,7 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
 
 
 def _pictures(one: Record, folder: Path) -> list[str]:
-    """Return the pictures of a step: drawings, and bitmaps of what has no drawing."""
+    """Return the pictures of a step as HTML: drawings, and bitmaps of what has no drawing."""
     paths = [folder / picture for picture in one.pictures]
     drawings = {path.stem for path in paths if path.suffix == ".svg"}
     return [embedded(one) for one in paths if one.suffix == ".svg" or one.stem not in drawings]

@@ -100,7 +100,7 @@ def _signals(context: Context) -> dict[str, str]:
 
 
 def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Traffic) -> None:
-    """Check that the axes were driven, and about as much in both drives."""
+    """Note as problems that an axis was not driven, or not about as much in both drives."""
     problems = outcome.problems
     table = new_table("axis", "driven before, s of full deflection", "after")
     for name in axes:
@@ -127,7 +127,7 @@ def _driven_s(axis: AxisTraffic) -> float:
 
 
 def _measured(context: Context, outcome: Outcome, raw: Recording, shaped: Recording) -> None:
-    """Compare the total swing of both drives."""
+    """Print, judge and draw the total swing of both drives."""
     measures = report_dict(
         raw,
         shaped,

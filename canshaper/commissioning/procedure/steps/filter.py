@@ -32,8 +32,8 @@ class Offer:
     """A design with its figures behind the limits of the machine, with the tail that is written.
 
     Attributes:
-        design: it.
-        chosen: its filter.
+        design: robust shaper or G_FF.
+        chosen: its filter section.
         verdict: whether it damps.
         figures: swing left (right length, at worst within 10 % of it) and dip in %, peak of the
             swing in degrees and without the filter, run-on in m, of a full press and release.
@@ -46,7 +46,7 @@ class Offer:
 
 
 def run(context: Context) -> Outcome:
-    """Design both filters for each axis, and ask which one to write."""
+    """Design both filters for each axis; where every axis has both, ask which one to write."""
     deployment, outcome = context.deployment, Outcome()
     offers = {name: _offers(deployment, name, outcome) for name in swinging(deployment)}
     kinds = [kind for kind in _NAMES if all(kind in one for one in offers.values())]

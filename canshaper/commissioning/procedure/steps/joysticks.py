@@ -24,7 +24,7 @@ MOST_ROWS = 24
 
 
 def listen(context: Context) -> Outcome:
-    """Listen, and look at every message that the deployment needs."""
+    """Listen, and judge every message that the deployment needs, and a machine's interfaces."""
     deployment = context.deployment
     log = context.folder / "buses.log"
     words = f"Switch the machine on; touch nothing while it listens, {LISTEN_S:.0f} s."
@@ -165,7 +165,7 @@ def _held(axis: AxisTraffic) -> float | None:
 
 
 def _other_signal(deployment: Deployment, name: str, moved: list[str]) -> tuple[str, str] | None:
-    """Return joystick and signal that moved where the file names others; else None."""
+    """Return joystick and signal that alone moved where the file names others; else None."""
     command = deployment.axes[name].config.command
     own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
     if len(moved) != 1 or moved[0] == own:

@@ -28,7 +28,7 @@ DRIVEN = {State.ACTIVE.name, State.BYPASS_ON.name}
 
 
 def ends(axes: Sequence[str], level: float) -> tuple[Stroke, ...]:
-    """Return strokes of every joystick forth and back, one after the other."""
+    """Return strokes of each joystick to +``level``, part of full, then to -``level``, in turn."""
     strokes, begin_s = [], FIRST_S
     for name in axes:
         for sign in (1.0, -1.0):
@@ -38,7 +38,7 @@ def ends(axes: Sequence[str], level: float) -> tuple[Stroke, ...]:
 
 
 def drive_dry(context: Context) -> Outcome:
-    """Let every joystick be moved while the daemon listens."""
+    """Let every joystick be moved while the daemon sends nothing; judge reach and states."""
     deployment = context.deployment
     log = context.folder / "dry.log"
     strokes = ends([*deployment.axes], 1.0)
@@ -151,7 +151,11 @@ GUIDE = (
 
 
 def move_first(context: Context) -> Outcome:
-    """Let every axis be moved a little, and the enable be let go in motion."""
+    """Let every axis be moved a little, and the enable be let go in motion; judge both.
+
+    Raises:
+        UsageError: an axis may move faster than at reduced speed.
+    """
     deployment = context.deployment
     fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > REDUCED_PCT]
     if fast:
@@ -220,7 +224,7 @@ def _follows(axis: AxisTraffic) -> bool:
 
 
 def _releases(axis: AxisTraffic) -> list[float]:
-    """Return how long the valve took to neutral each time the enable was let go in motion."""
+    """Return the times, s, from each release of enable in motion to neutral; infinite for never."""
     (time_s, valve), (at_s, enabled) = axis.valve.arrays(), axis.enabled.arrays()
     times_s = []
     for released_s in at_s[1:][(enabled[:-1] > 0.0) & (enabled[1:] == 0.0)]:

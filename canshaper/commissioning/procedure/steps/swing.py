@@ -54,7 +54,7 @@ def swinging(deployment: Deployment) -> list[str]:
 
 
 def run(context: Context) -> Outcome:
-    """Record a push of each axis and its swing, and identify it."""
+    """Identify the swing of each axis without a rope: by a recorded push, table or stopwatch."""
     deployment, bench = context.deployment, context.bench
     outcome = Outcome()
     axes = [name for name in swinging(deployment) if not deployment.axes[name].rope]
@@ -100,7 +100,7 @@ _TIMED = ("swings", "seconds", "first", "last")
 
 
 def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
-    """Ask what shows the swing of each axis; the simulated crane has a message of its own."""
+    """Ask what shows the swing of each axis; a rehearsal takes the simulated crane's message."""
     sources, own = _Sources(), simulated_signals(deployment, deployment.messages)
     for name in axes:
         sensor = deployment.axes[name].sway_sensor

@@ -71,7 +71,8 @@ def calibrate_valves(context: Context) -> Outcome:
 def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
     """Ask for MESSAGE.SIGNAL of the measured speed of an axis; ``NONE`` for none.
 
-    The feedback of the file or the usual signal is proposed; a rehearsal takes it without asking.
+    The feedback of the file, else the simulated crane's signal where the DBC files have it, is
+    proposed; a rehearsal takes it without asking.
     """
     default = SPEED_SIGNALS.get(deployment.coordinates.get(name, name), NONE)
     if isinstance(deployment.messages.find(default.partition(".")[0]), str):
@@ -103,7 +104,7 @@ VALVE = Step(
 
 
 def examine_sensors(context: Context) -> Outcome:
-    """Let each axis with a sensor be driven, and compare with its model."""
+    """Let each axis with a sensor be driven, and compare the sensor with the axis' model."""
     deployment, bench = context.deployment, context.bench
     axes = [name for name, axis in deployment.axes.items() if axis.sway_sensor]
     log = context.folder / "sensor.log"
