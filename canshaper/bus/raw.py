@@ -195,7 +195,9 @@ class RawPort(Interface):
         """Whether all valve frames sent are on the bus; None if the bus does not say."""
         if not self._confirms:
             return None
-        return not any(self._unconfirmed.get(word) for word in self._valves)
+        # Of the frames that a silent bus has dropped, no count is left.
+        waits = any(self._unconfirmed.get(word) for word in self._valves)
+        return not waits and self.state not in SILENT
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment, with its name of the bus and its messages."""
