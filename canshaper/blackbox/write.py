@@ -144,13 +144,17 @@ def _text(deployment: Deployment) -> tuple[list[str], str]:
     sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
     relative = [source for name, source in sources if not Path(name).is_absolute()]
     root = Path(os.path.commonpath([file.parent, *(source.parent for source in relative)]))
-    names = [str(Path(FOLDER) / file.relative_to(root))]
-    for name, source in sources:
+    names, moved = [str(Path(FOLDER) / file.relative_to(root))], dict[str, str]()
+    for i, (name, source) in enumerate(sources):
         if Path(name).is_absolute():
-            names.append(str(Path(FOLDER) / OUTSIDE / source.name))
-            text = text.replace(name, os.path.relpath(root / OUTSIDE / source.name, file.parent))
+            inside = Path(OUTSIDE, str(i), source.name)  # two files may have the same name
+            names.append(str(FOLDER / inside))
+            moved[name] = os.path.relpath(root / inside, file.parent)
         else:
             names.append(str(Path(FOLDER) / source.relative_to(root)))
+    if moved:  # all at once, the longest first: one path may be a part of another
+        paths = "|".join(map(re.escape, sorted(moved, key=len, reverse=True)))
+        text = re.sub(paths, lambda found: moved[found[0]], text)
     return names, text
 
 
