@@ -140,7 +140,7 @@ OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 
 
 def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
-    """Return the fault that an error frame reports, and the state of the bus or None.
+    """Return (fault that an error frame reports, state of the bus that it shows or None).
 
     Args:
         word: id of the error frame, with its flags.
