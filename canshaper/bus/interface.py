@@ -237,7 +237,7 @@ class Interface:
             receive_errors(self._sockets[min(1, len(self._sockets) - 1)], classes)
 
     def _block(self, state: BusState) -> None:
-        """Set a state in which one frame may be queued every ``PROBE_NS``; forget those under way."""
+        """Set a state in which one frame is queued every ``PROBE_NS``; forget those under way."""
         self.state = state
         self._not_before_ns = time.monotonic_ns() + PROBE_NS
         self._under_way.clear()

@@ -45,7 +45,7 @@ class ServiceManager:
         return self._socket is not None
 
     def waiting(self, status: str) -> None:
-        """Report that the service waits for an adapter, under the longer limit of the watchdog."""
+        """Report the service as ready while it waits for an adapter; the watchdog waits longer."""
         limit = f"\nWATCHDOG=1\nWATCHDOG_USEC={RELOAD_US}" if self._limit_us else ""
         self._send(f"READY=1\nSTATUS={status}{limit}")
 
