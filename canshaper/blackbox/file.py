@@ -1,4 +1,4 @@
-"""The file of a black box: a line that names the format, a header in JSON, then the segments."""
+"""The recording of a black box: a line that names its format, a header in JSON, the segments."""
 
 import json
 import struct
@@ -40,7 +40,7 @@ class BoxSegment(NamedTuple):
 
 @dataclass
 class Box:
-    """Content of a black box.
+    """Content of a recording.
 
     Attributes:
         path: path of the file.
@@ -56,7 +56,7 @@ class Box:
 
 
 def chunks(header: dict[str, Any], segments: Iterable[Segment]) -> Iterator[bytes]:
-    """Yield the bytes of the file of a black box, piece by piece."""
+    """Yield the bytes of a recording, piece by piece."""
     yield MAGIC + json.dumps(header).encode() + b"\n"
     for one in segments:
         data = one.data()
@@ -67,10 +67,10 @@ def chunks(header: dict[str, Any], segments: Iterable[Segment]) -> Iterator[byte
 
 
 def read_box(path: Path) -> Box:
-    """Read a black box.
+    """Read a recording, which is unpacked from its bundle; see ``Box.cut_off`` for a damaged one.
 
     Raises:
-        BoxError: the file is no black box, or has no whole segment.
+        BoxError: the file is no recording, its header is wrong, or it has no whole segment.
         OSError: the file cannot be read.
     """
     with path.open("rb") as file:

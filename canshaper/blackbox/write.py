@@ -27,7 +27,7 @@ PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpac
 
 
 def last_number(folder: Path, stem: str) -> int:
-    """Return the number of the newest black box of a deployment in a folder; 0 without one."""
+    """Return the highest number of a deployment's black boxes in a folder; 0 if none is found."""
     try:
         return max(_numbered(folder, stem), default=0)
     except OSError:
@@ -42,10 +42,10 @@ def _numbered(folder: Path, stem: str) -> dict[int, Path]:
 def write_box(
     folder: Path, deployment: Deployment, segments: Iterable[Segment], why: str, number: int
 ) -> Path:
-    """Write a black box into a folder, and remove the oldest files beyond ``MOST_FILES``.
+    """Write a black box into a folder, and remove its oldest ones beyond ``MOST_FILES``.
 
-    The file is on the disk when this returns, so it survives a power cut. Until then an older file
-    with the same number stays. If the disk is full, the oldest files are removed.
+    The file is on the disk when this returns its path, so it survives a power cut. Until then an
+    older file with the same number stays. While the disk is full, the oldest files are removed.
 
     Args:
         folder: folder, created if it is missing.
@@ -138,7 +138,7 @@ def carried(deployment: Deployment) -> tuple[str, dict[str, bytes]]:
 
 
 def _text(deployment: Deployment) -> tuple[list[str], str]:
-    """Return (names of the deployment file and its DBC files in a bundle, text of the first)."""
+    """Return (names of deployment and DBC files in a bundle, deployment file with paths there)."""
     file = deployment.path.resolve()
     text = deployment.source.content.decode("utf-8")
     sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
@@ -177,7 +177,7 @@ def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of program, interpreter, packages and kernel."""
+    """Return the versions of program, interpreter, packages and kernel, by name."""
     installed = {"canshaper": version("canshaper"), "python": platform.python_version()}
     for name in PACKAGES:
         try:

@@ -102,10 +102,7 @@ class Reporter:
         self._status_ns = boottime_ns() + SECOND_NS
 
     def numbers(self) -> dict[str, Any]:
-        """Return what a client shows: axes, buses, counters, lateness since the last status line.
-
-        ``joystick`` and ``setpoint`` are parts of full speed.
-        """
+        """Return axes (parts of full speed), buses, counters, largest lateness for a client."""
         controller = self._controller
         return {
             "digest": controller.deployment.identity.digest,

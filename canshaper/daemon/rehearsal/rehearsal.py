@@ -220,7 +220,7 @@ class Rehearsal(Recorder):
             self._end("its time is over")
 
     def _held(self, now_ns: int) -> bool:
-        """Return whether its axis has moved for ``HELD_NS``; without one, whether every axis rests."""
+        """Return whether its axis moved for ``HELD_NS``; without one, whether every axis rests."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
         if not any(one.state is State.ACTIVE and abs(one.demand) >= LEAST_DEMAND for one in axes):
             self._still_ns = now_ns
