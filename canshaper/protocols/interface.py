@@ -137,5 +137,5 @@ class BusProtocol:
         """Prepare the end: the next frame of every valve is the last one."""
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
-        """Yield (key, part) for a reload, not of ``inputs``; ``places``: key of each bus by name."""
+        """Yield (key, part) for a reload, not of ``inputs``; ``places``: key of a bus by name."""
         yield from ()
