@@ -271,8 +271,8 @@ class BlackBox:
             segment.held = False
         if self.fault:  # write again at once, if there were trips meanwhile or the ring has more
             newer = self._last_ns - AFTER_NS > self._kept.at_ns
-            there = any(one.begin_ns <= self._begun_ns for one in self._ring.segments)
-            self._due_ns = min(self._due_ns, now_ns) if newer or there else NEVER_NS
+            more = any(newer or one.begin_ns <= self._begun_ns for one in self._ring.segments)
+            self._due_ns = min(self._due_ns, now_ns) if more else NEVER_NS
         if self._kept.number != self._logged:
             self._logged = self._kept.number
             log.warning("black-box=written folder=%s %s", self._folder, self._kept.why)
