@@ -34,9 +34,9 @@ class Kind(IntEnum):
     NEUTRAL = 7
     """Neutral frames were computed outside of a tick."""
     OFF_BUS = 8
-    """Our CAN controller is off bus ``number``."""
+    """Our CAN controller is off the bus of index ``number``."""
     FAULT = 9
-    """A bus has the fault ``number``."""
+    """A bus has the ``FrameFault`` of this ``number``."""
     SET = 10
     """An operator changed numbers: a part of their JSON; ``number`` bytes are left, with these."""
     BEFORE = 11

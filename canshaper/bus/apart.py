@@ -87,7 +87,7 @@ class BusApart:
         """Hand a frame to the sending thread; it replaces a waiting frame with the same id.
 
         Raises:
-            can.CanTimeoutError: the adapter takes no frames; this frame is dropped.
+            can.CanTimeoutError: the adapter takes no frames; this one and waiting ones are dropped.
             Exception: the error of the interface for an earlier frame; this frame is dropped.
         """
         now_ns = boottime_ns()
@@ -167,7 +167,7 @@ class BusApart:
             self._bus.shutdown()
 
     def _next(self) -> can.Message | None:
-        """Wait for a frame that is not too old, and return it; None once the bus closes."""
+        """Wait for a frame not older than ``LEAVE_NS``, and return it; None once the bus closes."""
         with self._changed:
             while True:
                 while not self._waiting:

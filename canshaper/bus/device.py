@@ -231,7 +231,7 @@ def _upwards(place: Path, root: Path) -> Iterator[Path]:
 
 
 def _serial(places: Iterable[Path]) -> str | None:
-    """Return the serial number of the nearest USB device, not that of the hub above it."""
+    """Return the serial number of the nearest USB device, not of the hub above; None for none."""
     for place in places:
         if (place / "idVendor").exists():
             return _content(place / "serial")

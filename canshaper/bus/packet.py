@@ -23,7 +23,7 @@ SIZE = CAN_FRAME.size
 FD_FRAME = struct.Struct("=IBB2x64s")
 FD_SIZE = FD_FRAME.size
 WORD = struct.Struct("=I")
-"""The first member of both structures: the id with its flags."""
+"""First member of ``CAN_FRAME`` and ``FD_FRAME``: the id with its flags."""
 BRS, FDF = 0x01, 0x04
 """Flags of a CAN FD frame: bit rate switch for its data; the frame is CAN FD."""
 

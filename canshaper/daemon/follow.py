@@ -100,7 +100,10 @@ class TickFollower:
         return news
 
     def _last_of_cluster(self, came_ns: int) -> int:
-        """Return the arrival of the last frame in the cluster that begins with this frame."""
+        """Return when the last frame of other joysticks comes that follows this one closely.
+
+        Each of them comes ``CLUSTER_NS`` after the one before at most, as in the last cycle.
+        """
         cycle_ns = self._cycle_ns
         offsets = [
             (other_ns - came_ns) % cycle_ns

@@ -102,7 +102,7 @@ class Reporter:
         self._status_ns = boottime_ns() + SECOND_NS
 
     def numbers(self) -> dict[str, Any]:
-        """Return axes (parts of full speed), buses, counters, largest lateness for a client."""
+        """Return axes (values: parts of full speed), buses, counters, lateness (s) for a client."""
         controller = self._controller
         return {
             "digest": controller.deployment.identity.digest,

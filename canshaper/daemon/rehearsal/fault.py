@@ -38,7 +38,7 @@ class Fault:
         once: whether only one frame is altered.
         age_ns: time by which an altered frame arrives earlier.
         begin: makes the fault once.
-        end: frame of another sender that ends the fault.
+        end: frame received at the end, as of another sender, unless that has sent one itself.
         late: numbers of the ticks that are late, from 0 when the fault is made.
         stands: whether the late ticks are a standstill, in which no frame is read.
         unsent: whether valve frames are reported as not sent, although they are sent.

@@ -203,7 +203,7 @@ class Rehearsal(Recorder):
             self._made_ns = now_ns
 
     def _step(self, now_ns: int) -> None:
-        """Enter the next phase if it is time."""
+        """Go on from armed to made, over and done if it is time."""
         lasted_ns = now_ns - self._since_ns
         if self._phase == OVER:
             stops = any(event[2] in STOPS for event in self._events)
