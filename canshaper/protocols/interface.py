@@ -43,7 +43,7 @@ class DrivenAxis(Protocol):
 
     @property
     def feedback(self) -> Feedback | None:
-        """Feedback of its valve."""
+        """Feedback of its valve; None without one."""
 
     @property
     def stops(self) -> StopCauses:
@@ -80,7 +80,7 @@ class ForwardingRule(Protocol):
         """Return a frame of our own if joystick frames are missing while a motion has to end."""
 
     def last(self) -> list[Frame]:
-        """Return the last frames before we leave the bus."""
+        """Return the neutral frames to send last; none unless the last frame may move a valve."""
 
 
 class BusProtocol:

@@ -68,7 +68,7 @@ class ValveControl(Input):
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
         """Store the valve's state (low four bits of the status word) if the frame is accepted.
 
-        A state but ACTIVE, even in a frame that is not accepted, makes the next ``gate`` fail.
+        After another state than ACTIVE, even in a refused frame, ``gate`` once lets nothing move.
         """
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
@@ -141,7 +141,7 @@ class CanopenNetwork(BusProtocol):
             interlocks of each; its sway sensor counts only while the sensor's node works.
 
     Attributes:
-        nodes: our node on each bus of CANopen, by bus.
+        nodes: our node and the others on each bus of CANopen, by bus.
         controls: the state machine of a valve of CiA 408, by the name of its axis.
         bound: (status message, state machine) of the same valves.
     """

@@ -81,7 +81,7 @@ class ForwardedJoystick:
         return self._message.own(enabled=stopping)
 
     def last(self) -> list[Frame]:
-        """Return the last frame before we leave, a neutral one; none unless the last may move."""
+        """Return the neutral frame to send last; none unless the last frame may move a valve."""
         return [self._message.own(enabled=False)] if self.moves else []
 
     def _any_moves(self) -> bool:

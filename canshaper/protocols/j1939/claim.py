@@ -50,7 +50,7 @@ class AddressClaim:
         bus: name of the bus.
         config: address and NAME.
         answered: groups (PGN) that other parts of ours send on request.
-        cyclic: groups (PGN) that we send cyclically; the next cycle answers a request.
+        cyclic: groups (PGN) that we send anyway; no request for one of them is refused.
         guest: whether the address may belong to another node: we ask first, claim it only if no
             one answers, give it up to any node that claims it, whatever its NAME, and refuse
             nothing.
@@ -201,7 +201,7 @@ class Node:
     Args:
         bus: name of the bus.
         config: address and NAME.
-        cyclic: groups (PGN) that we send cyclically, so that no one has to request them.
+        cyclic: groups (PGN) that we send anyway; no request for one of them is refused.
         guest: whether the address may belong to another node; then no fault is sent.
 
     Attributes:

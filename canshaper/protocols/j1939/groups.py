@@ -111,7 +111,7 @@ class ReceivedGroup:
         self.rest: AnySource | None = None
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Receive a frame; from our address it is a fault, without an input it is ignored."""
+        """Receive a frame; one from our address is a fault, one without an input is ignored."""
         source = frame.can_id & 0xFF
         if source == self._own:
             return FrameFault.SECOND_SENDER
