@@ -44,7 +44,7 @@ class Kind(IntEnum):
 
 
 class Record(NamedTuple):
-    """A record, unpacked: a frame with id ``number`` on the bus of index ``bus``; or see ``Kind``."""
+    """A record, unpacked: a frame with id ``number`` on the bus of index ``bus``, or a ``Kind``."""
 
     kind: int
     bus: int
