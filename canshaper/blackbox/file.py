@@ -79,7 +79,7 @@ def read_box(path: Path) -> Box:
         try:
             header = json.loads(file.readline(MOST_HEADER))
             box = Box(path, _checked(header), [])
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             text = f"expected what canshaper writes, got {type(error).__name__} {error}"
             raise BoxError(f"{path}: header: {text}") from None
         while head := file.read(HEAD.size):
@@ -100,9 +100,9 @@ def _checked(header: dict[str, Any]) -> dict[str, Any]:
     """Return the entries of a header that a reader needs, converted to their types.
 
     Raises:
-        ValueError, KeyError, TypeError: an entry is missing or of another type.
+        ValueError, KeyError, TypeError, OverflowError: an entry is missing or of another kind.
     """
-    header.setdefault("carried", [])  # older programs wrote none
+    header = {"carried": [], **header}  # older programs wrote none
     names = {key: [str(one) for one in header[key]] for key in ("buses", "identity", "carried")}
     numbers = {key: int(header[key]) for key in ("time_ns", "clock_ns")}
     listens = bool(header["listen_only"])
