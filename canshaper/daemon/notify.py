@@ -67,7 +67,7 @@ class ServiceManager:
         self._send(f"STATUS={text}")
 
     def ping(self, now_ns: int) -> None:
-        """Report that the control loop is alive, no more often than the watchdog requires."""
+        """Report every quarter of the watchdog's limit that the loop lives; repeat unsent ones."""
         if self._unsent:
             self._send_surely(self._unsent)
         if self._ping_ns and now_ns >= self._next_ping_ns:

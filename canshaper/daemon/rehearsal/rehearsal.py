@@ -37,7 +37,7 @@ NOTHING = Fault("", "", (), 0)
 
 
 class Rehearsal(Recorder):
-    """A recorder that alters received frames by at most one fault; arguments as ``Recorder``."""
+    """A recorder that makes one fault at a time on the input side; arguments as ``Recorder``."""
 
     def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
         super().__init__(gated, controller, ring)
