@@ -1,4 +1,4 @@
-"""The file of a black box: a line that names the format, a header in JSON, then the segments."""
+"""The recording of a black box: a line that names its format, a header in JSON, the segments."""
 
 import json
 import struct
@@ -40,7 +40,7 @@ class BoxSegment(NamedTuple):
 
 @dataclass
 class Box:
-    """Content of a black box.
+    """Content of a recording.
 
     Attributes:
         path: path of the file.
@@ -56,7 +56,7 @@ class Box:
 
 
 def chunks(header: dict[str, Any], segments: Iterable[Segment]) -> Iterator[bytes]:
-    """Yield the bytes of the file of a black box, piece by piece."""
+    """Yield the bytes of a recording, piece by piece."""
     yield MAGIC + json.dumps(header).encode() + b"\n"
     for one in segments:
         data = one.data()
@@ -67,10 +67,10 @@ def chunks(header: dict[str, Any], segments: Iterable[Segment]) -> Iterator[byte
 
 
 def read_box(path: Path) -> Box:
-    """Read a black box.
+    """Read a recording, which is unpacked from its bundle; see ``Box.cut_off`` for a damaged one.
 
     Raises:
-        BoxError: the file is no black box, or has no whole segment.
+        BoxError: the file is no recording, its header is wrong, or it has no whole segment.
         OSError: the file cannot be read.
     """
     with path.open("rb") as file:
@@ -79,7 +79,7 @@ def read_box(path: Path) -> Box:
         try:
             header = json.loads(file.readline(MOST_HEADER))
             box = Box(path, _checked(header), [])
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             text = f"expected what canshaper writes, got {type(error).__name__} {error}"
             raise BoxError(f"{path}: header: {text}") from None
         while head := file.read(HEAD.size):
@@ -100,9 +100,9 @@ def _checked(header: dict[str, Any]) -> dict[str, Any]:
     """Return the entries of a header that a reader needs, converted to their types.
 
     Raises:
-        ValueError, KeyError, TypeError: an entry is missing or of another type.
+        ValueError, KeyError, TypeError, OverflowError: an entry is missing or of another kind.
     """
-    header.setdefault("carried", [])  # older programs wrote none
+    header = {"carried": [], **header}  # older programs wrote none
     names = {key: [str(one) for one in header[key]] for key in ("buses", "identity", "carried")}
     numbers = {key: int(header[key]) for key in ("time_ns", "clock_ns")}
     listens = bool(header["listen_only"])

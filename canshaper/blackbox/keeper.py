@@ -1,4 +1,4 @@
-"""Keeps the black box of a daemon, and writes it to a file after a trip or on request.
+"""Keeps the black box of a daemon, and writes it to a file after a trip or stop or on request.
 
 A forked process writes the file: the fork costs the loop about a millisecond, and a slow disk costs
 it no time. The file is written at once, and a second time with the records that follow the trip.
@@ -94,7 +94,11 @@ class BlackBox:
     def around(
         self, gated: GatedController, controller: Controller, kind: type[Recorder] = Recorder
     ) -> Recorder:
-        """Make a recorder of a class for a controller behind its gate; ``begin`` starts it."""
+        """Make a recorder of a class for a controller behind its gate; ``begin`` starts it.
+
+        Records of another deployment are dropped, after a file that is due is written. If the state
+        of the controller cannot be saved, nothing is recorded.
+        """
         deployment = controller.deployment
         self._flush()
         self._ring.pause()
@@ -115,17 +119,17 @@ class BlackBox:
         return self._recorder
 
     def begin(self, now_ns: int) -> None:
-        """Begin to record."""
+        """Begin a segment; records between the last one and it are missing."""
         self._flush()  # empties the notes of earlier calls
         self._keep_state(now_ns, follows=False)
 
     def after_tick(self, now_ns: int, events: Iterable[object], *, neutral: bool) -> None:
-        """Do the work of a tick that can wait until its frames are sent.
+        """Pack the records of a tick, save the state if it is due, and write files that are due.
 
         Args:
             now_ns: time of the tick.
-            events: events of the tick.
-            neutral: whether every axis is neutral.
+            events: events of the tick; a trip or a stop schedules a file.
+            neutral: whether every axis is neutral; with short ticks a state is saved only then.
         """
         self._flush()
         self._now_ns = now_ns
@@ -142,7 +146,7 @@ class BlackBox:
             self._start_writer(now_ns)
 
     def _happened(self, why: str, last_ns: int) -> None:
-        """Schedule a file now, and the same file again at ``last_ns``."""
+        """Schedule a file now and at ``last_ns``: the last one, after ``BETWEEN_NS`` a new one."""
         if not self._folder or not self._ring.segments:
             return
         now_ns = self._now_ns
@@ -154,7 +158,7 @@ class BlackBox:
             self._due_ns = min(self._due_ns, max(now_ns, self._least_ns))
 
     def request(self) -> None:
-        """Schedule a file on request of a client.
+        """Schedule a file on request of a client; none if nothing is recorded.
 
         Raises:
             ValueError: the daemon has no folder for files.
@@ -164,7 +168,7 @@ class BlackBox:
         self._happened("requested", self._last_ns)
 
     def report(self) -> dict[str, object]:
-        """Return the number of attempts, the last fault, the folder, and whether a file is due."""
+        """Return attempts (``tried``), last ``fault``, ``folder``; ``waits``: a file is due."""
         waits = bool(self._writer or self._due_ns != NEVER_NS)
         return {"tried": self._done, "fault": self.fault, "folder": str(self._folder or ""),
                 "waits": waits}  # fmt: skip
@@ -267,15 +271,15 @@ class BlackBox:
             segment.held = False
         if self.fault:  # write again at once, if there were trips meanwhile or the ring has more
             newer = self._last_ns - AFTER_NS > self._kept.at_ns
-            there = any(one.begin_ns <= self._begun_ns for one in self._ring.segments)
-            self._due_ns = min(self._due_ns, now_ns) if newer or there else NEVER_NS
+            more = any(newer or one.begin_ns <= self._begun_ns for one in self._ring.segments)
+            self._due_ns = min(self._due_ns, now_ns) if more else NEVER_NS
         if self._kept.number != self._logged:
             self._logged = self._kept.number
             log.warning("black-box=written folder=%s %s", self._folder, self._kept.why)
         self._kept, self.fault = None, ""
 
     def _log_fault(self, number: int) -> None:
-        """Log why a file cannot be written, unless the last fault was the same."""
+        """Log why a file cannot be written (error number; negative: killed), if that is news."""
         fault = os.strerror(number) if number > 0 else "killed"
         if fault != self.fault:
             log.error("black-box=not-written folder=%s %s", self._folder, fault)

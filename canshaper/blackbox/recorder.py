@@ -72,7 +72,7 @@ class Recorder:
         return self._gated.withhold(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return a neutral frame for every valve."""
+        """Return the neutral frames to send last, but for those that the gate refuses."""
         self._note((Kind.NEUTRAL, None, 0, 0))
         frames = self._gated.neutral_frames()
         for frame in frames:
@@ -85,12 +85,12 @@ class Recorder:
         self._controller.on_bus_off(bus)
 
     def fault(self, fault: FrameFault) -> None:
-        """Take note that a bus has a fault."""
+        """Count a fault of a bus."""
         self._note((Kind.FAULT, None, fault, 0))
         self._controller.counters.add(fault)
 
     def set(self, values: Mapping[str, object]) -> None:
-        """Take note that an operator changed numbers of the file; key to value."""
+        """Give the gate numbers of the file, by key, that an operator has changed."""
         self._gated.set(values)
         self.flush()
         text = json.dumps(values).encode()
@@ -107,7 +107,7 @@ class Recorder:
         raise ValueError("faults are rehearsed where the file has control.rehearse_faults")
 
     def reloads(self) -> None:
-        """Take note that a reload replaces the controller."""
+        """Prepare for a reload, which replaces the controller; here there is nothing to do."""
 
     def flush(self) -> None:
         """Pack the notes into the ring."""

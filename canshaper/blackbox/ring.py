@@ -23,7 +23,8 @@ class Kind(IntEnum):
     RX = 2
     """A frame was read; ``time_ns`` is its arrival."""
     TX = 3
-    """The controller computed a frame; if it did not leave, ``FAILED`` or ``WITHHELD`` precedes."""
+    """The controller computed a frame. If it did not leave, ``FAILED`` or ``WITHHELD`` precedes a
+    frame of a tick, and follows a joystick's forwarded frame."""
     FAILED = 4
     """A frame did not reach its bus."""
     WITHHELD = 5
@@ -33,17 +34,17 @@ class Kind(IntEnum):
     NEUTRAL = 7
     """Neutral frames were computed outside of a tick."""
     OFF_BUS = 8
-    """Our CAN controller is off bus ``number``."""
+    """Our CAN controller is off the bus of index ``number``."""
     FAULT = 9
-    """A bus has the fault ``number``."""
+    """A bus has the ``FrameFault`` of this ``number``."""
     SET = 10
-    """An operator changed numbers: a part of their JSON, of which ``number`` bytes are left."""
+    """An operator changed numbers: a part of their JSON; ``number`` bytes are left, with these."""
     BEFORE = 11
     """8 bytes that precede the data of the next record: a CAN FD frame has up to 64."""
 
 
 class Record(NamedTuple):
-    """A record, unpacked."""
+    """A record, unpacked: a frame with id ``number`` on the bus of index ``bus``, or a ``Kind``."""
 
     kind: int
     bus: int
@@ -55,12 +56,12 @@ class Record(NamedTuple):
 
     @property
     def payload(self) -> bytes:
-        """Data of its frame, padded with 0 to the length of a frame too long for CAN."""
+        """The ``length`` bytes of its data; 0 for those that the records lack."""
         return self.data[: self.length].ljust(self.length, b"\0")
 
 
 def records(data: bytes | memoryview) -> Iterator[Record]:
-    """Yield every record of a segment in order of time, each with all its data."""
+    """Yield the records of a segment as written; those of ``BEFORE`` join the data of the next."""
     before = b""
     for record in map(Record._make, RECORD.iter_unpack(data)):
         if record.kind == Kind.BEFORE:
@@ -144,7 +145,7 @@ class Ring:
         time_ns: int,
         data: bytes,
     ) -> None:
-        """Write one record, see ``canshaper.blackbox.ring``."""
+        """Write one record, its fields as in ``Record``; without an open segment it is lost."""
         at = self._at
         if at == BLOCK:
             at = self._next_block()
@@ -152,7 +153,10 @@ class Ring:
         self._at = at + SIZE
 
     def begin(self, state: bytes, now_ns: int, *, follows: bool) -> None:
-        """Begin a segment, and drop segments that are no longer needed for the last minute."""
+        """Begin a segment, and drop segments that are no longer needed for the last minute.
+
+        After a segment that was cut off, ``follows`` counts as False.
+        """
         self.pause()
         segments = self._segments
         follows = follows and bool(segments) and not self.cut_off
@@ -182,7 +186,7 @@ class Ring:
             self._free += segment.blocks
 
     def _next_block(self) -> int:
-        """Choose the block for the next record; return the offset in it."""
+        """Take a block for the next record, if need be the oldest segment's; return the offset."""
         segment = self._open
         if segment is None:
             return 0  # between segments: the record is lost

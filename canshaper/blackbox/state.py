@@ -95,7 +95,7 @@ class States:
         self._packages = {name for name in packages if name.startswith("canshaper.")}
 
     def save(self) -> bytes:
-        """Return the present state of the controller.
+        """Return the present state of the controller as bytes.
 
         Raises:
             StateError: an object in it cannot be saved.
@@ -108,7 +108,7 @@ class States:
         return file.getvalue()
 
     def load(self, state: bytes) -> Root:
-        """Return a controller in a saved state, behind its gate.
+        """Return (gated, controller) in a saved state: a controller behind its gate, and itself.
 
         Raises:
             StateError: the state is damaged, or is of another deployment or program.

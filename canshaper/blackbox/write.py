@@ -27,7 +27,7 @@ PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpac
 
 
 def last_number(folder: Path, stem: str) -> int:
-    """Return the number of the newest black box of a deployment in a folder; 0 without one."""
+    """Return the highest number of a deployment's black boxes in a folder; 0 if none is found."""
     try:
         return max(_numbered(folder, stem), default=0)
     except OSError:
@@ -42,10 +42,10 @@ def _numbered(folder: Path, stem: str) -> dict[int, Path]:
 def write_box(
     folder: Path, deployment: Deployment, segments: Iterable[Segment], why: str, number: int
 ) -> Path:
-    """Write a black box into a folder, and remove the oldest files beyond ``MOST_FILES``.
+    """Write a black box into a folder, and remove its oldest ones beyond ``MOST_FILES``.
 
-    The file is on the disk when this returns, so it survives a power cut. Until then an older file
-    with the same number stays. If the disk is full, the oldest files are removed.
+    The file is on the disk when this returns its path, so it survives a power cut. Until then an
+    older file with the same number stays. While the disk is full, the oldest files are removed.
 
     Args:
         folder: folder, created if it is missing.
@@ -138,19 +138,23 @@ def carried(deployment: Deployment) -> tuple[str, dict[str, bytes]]:
 
 
 def _text(deployment: Deployment) -> tuple[list[str], str]:
-    """Return (names of the deployment file and its DBC files in a bundle, text of the first)."""
+    """Return (names of deployment and DBC files in a bundle, deployment file with paths there)."""
     file = deployment.path.resolve()
     text = deployment.source.content.decode("utf-8")
     sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
     relative = [source for name, source in sources if not Path(name).is_absolute()]
     root = Path(os.path.commonpath([file.parent, *(source.parent for source in relative)]))
-    names = [str(Path(FOLDER) / file.relative_to(root))]
-    for name, source in sources:
+    names, moved = [str(Path(FOLDER) / file.relative_to(root))], dict[str, str]()
+    for i, (name, source) in enumerate(sources):
         if Path(name).is_absolute():
-            names.append(str(Path(FOLDER) / OUTSIDE / source.name))
-            text = text.replace(name, os.path.relpath(root / OUTSIDE / source.name, file.parent))
+            inside = Path(OUTSIDE, str(i), source.name)  # two files may have the same name
+            names.append(str(FOLDER / inside))
+            moved[name] = os.path.relpath(root / inside, file.parent)
         else:
             names.append(str(Path(FOLDER) / source.relative_to(root)))
+    if moved:  # all at once, the longest first: one path may be a part of another
+        paths = "|".join(map(re.escape, sorted(moved, key=len, reverse=True)))
+        text = re.sub(paths, lambda found: moved[found[0]], text)
     return names, text
 
 
@@ -173,7 +177,7 @@ def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of program, interpreter, packages and kernel."""
+    """Return the versions of program, interpreter, packages and kernel, by name."""
     installed = {"canshaper": version("canshaper"), "python": platform.python_version()}
     for name in PACKAGES:
         try:

@@ -1,1 +1,1 @@
-"""Sockets: raw SocketCAN, python-can, netlink; a bus as a device; clocks."""
+"""Sockets: raw SocketCAN, python-can, netlink; a bus as a device; arrivals."""

@@ -49,7 +49,7 @@ class BusApart:
         since_ns: time by ``boottime_ns`` when the bus was last seen empty before the frame that
             ``recv`` has just returned. The frame arrived after that time.
         took: whether the interface took the last frame in time.
-        lost: number of frames dropped because too many waited to be read.
+        lost: number of received frames dropped because too many waited to be read.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class BusApart:
         """Hand a frame to the sending thread; it replaces a waiting frame with the same id.
 
         Raises:
-            can.CanTimeoutError: the adapter takes no frames; this frame is dropped.
+            can.CanTimeoutError: the adapter takes no frames; this one and waiting ones are dropped.
             Exception: the error of the interface for an earlier frame; this frame is dropped.
         """
         now_ns = boottime_ns()
@@ -127,7 +127,7 @@ class BusApart:
         return self._wake_reader.fileno()
 
     def shutdown(self) -> None:
-        """Close the bus after the waiting frames are sent; abandon it if it is blocked."""
+        """Close the bus after the waiting frames are sent; abandon it after ``CLOSE_S``."""
         with self._changed:
             self._closing = True
             self._changed.notify()
@@ -167,7 +167,7 @@ class BusApart:
             self._bus.shutdown()
 
     def _next(self) -> can.Message | None:
-        """Wait for a frame that is not too old, and return it; None when the bus closes."""
+        """Wait for a frame not older than ``LEAVE_NS``, and return it; None once the bus closes."""
         with self._changed:
             while True:
                 while not self._waiting:
@@ -206,7 +206,7 @@ class BusApart:
                 self._readable(LOOK_S)
 
     def _readable(self, timeout_s: float) -> bool:
-        """Return whether the line has bytes to read, after waiting ``timeout_s`` at most."""
+        """Return whether a line has bytes to read, in ``timeout_s`` at most; False if unknown."""
         if self._descriptor >= 0:
             with suppress(OSError, ValueError):  # closed meanwhile
                 return bool(select([self._descriptor], [], [], timeout_s)[0])

@@ -90,12 +90,12 @@ def read_device(
 
 
 def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
-    """Compare the device behind bound sockets with the device in the deployment file.
+    """Compare the device behind bound sockets with the one in the file, if the file gives one.
 
     The sockets say which interface they are bound to: another interface may have the name by now.
 
     Raises:
-        WrongDeviceError: it is another device, or the device cannot be read.
+        WrongDeviceError: it is another device, cannot be read, or its name changed hands.
         OSError: the interface is gone.
     """
     if bus.match is None:
@@ -161,7 +161,7 @@ def device_fault(bus: Bus, device: Device) -> str | None:
 def expected(bus: Bus, device: Device) -> dict[str, str | int]:
     """Return the values that the device of a bus must have, by field of ``Device``.
 
-    The bit rates of the bus are among them if the interface reports bit rates.
+    A bus without ``match`` asks for none. Its bit rates count if the interface reports bit rates.
     """
     if bus.match is None:
         return {}
@@ -173,7 +173,7 @@ def expected(bus: Bus, device: Device) -> dict[str, str | int]:
 
 
 def match_fault(bus: Bus) -> str | None:
-    """Return why the interface of a bus is now another device; None if it is the right one.
+    """Return why the interface of a bus is another device; None if not, or if none is named.
 
     Raises:
         OSError: there is no such interface, or the kernel cannot be asked.
@@ -185,8 +185,8 @@ def match_fault(bus: Bus) -> str | None:
 def whereabouts(bus: Bus, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates) -> str:
     """Return the end of a message that names the interface where the device of a bus is now.
 
-    It is empty if the bus names no device. The interface is only reported, never driven: the file
-    decides which interface is driven.
+    It is empty if the bus names no serial number or path, or if the device is at its own channel.
+    The interface is only reported, never driven: the file decides which interface is driven.
     """
     match = bus.match
     if match is None or (match.serial is None and match.path is None):
@@ -231,7 +231,7 @@ def _upwards(place: Path, root: Path) -> Iterator[Path]:
 
 
 def _serial(places: Iterable[Path]) -> str | None:
-    """Return the serial number of the nearest USB device, not that of the hub above it."""
+    """Return the serial number of the nearest USB device, not of the hub above; None for none."""
     for place in places:
         if (place / "idVendor").exists():
             return _content(place / "serial")

@@ -62,8 +62,8 @@ class UnderWay:
     """Our frames that were sent and not yet confirmed.
 
     Attributes:
-        counts: number of frames by kernel id.
-        claims: address claims, unpacked; the socket of the inputs receives them back.
+        counts: number of frames by id with its flags.
+        claims: address claims as ``CAN_FRAME`` unpacks them; the first socket receives them back.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,10 @@ class UnderWay:
         self._since_ns: dict[int, int] = {}
 
     def waited_ns(self, word: int, now_ns: int) -> int:
-        """Return how long frames of an id have been unconfirmed, ns; 0 while that is no fault."""
+        """Return how long frames of an id wait for a confirmation, ns; 0 while that is no fault.
+
+        The time counts from the first call since their last confirmation.
+        """
         waited_ns = now_ns - self._since_ns.setdefault(word, now_ns)
         if self.counts[word] < MOST_UNCONFIRMED or waited_ns < UNCONFIRMED_NS:
             return 0
@@ -84,7 +87,7 @@ class UnderWay:
         self._since_ns.pop(word, None)
 
     def restart(self, word: int) -> None:
-        """Count the frames of an id from 0."""
+        """Count the frames of an id, and the time that they wait, from 0."""
         self.counts[word] = 0
         del self._since_ns[word]
 
@@ -176,7 +179,7 @@ class Interface:
         self._not_before_ns = 0
 
     def _failed(self, error: OSError) -> None:
-        """Set the state that an error of a socket shows."""
+        """Set the state that an error of a socket shows, and report it; a full queue shows none."""
         if error.errno in GONE:
             self._away(BusState.GONE, FrameFault.BUS_GONE)
         elif error.errno == errno.ENETDOWN:
@@ -195,7 +198,7 @@ class Interface:
             self._on_fault(FrameFault.BUS_ERROR)
 
     def _away(self, state: BusState, fault: FrameFault, why: str = "") -> None:
-        """Close the sockets until the interface can be opened again; report the fault once."""
+        """Set a state, report it if it is new, and close the sockets until they can be reopened."""
         self.close()
         self._not_before_ns = time.monotonic_ns() + REOPEN_NS
         if self.state is not state:
@@ -203,7 +206,10 @@ class Interface:
             self._on_fault(fault)
 
     def _no_frame(self, data: bytes) -> None:
-        """Set the state that an error frame shows; report any other packet as of wrong length."""
+        """Report an error frame and set the state that it shows; the rest is a WRONG_LENGTH.
+
+        After ``MOST_ERRORS`` in a tick, receive for ``QUIET_NS`` only those that show a state.
+        """
         word, _length, payload = CAN_FRAME.unpack(data) if len(data) == SIZE else (0, 0, b"")
         if not word & ERR_FLAG:
             self._on_fault(FrameFault.WRONG_LENGTH)
@@ -225,19 +231,19 @@ class Interface:
             self._receive_errors(STATE_CLASSES, time.monotonic_ns() + QUIET_NS)
 
     def _receive_errors(self, classes: int, until_ns: int) -> None:
-        """Receive error frames of these classes only, until a time."""
+        """Receive error frames of these classes only, until a time; 0: for good."""
         self._quiet_until_ns = until_ns
         with suppress(OSError, IndexError):  # gone: it is opened again with all classes
             receive_errors(self._sockets[min(1, len(self._sockets) - 1)], classes)
 
     def _block(self, state: BusState) -> None:
-        """Set a state in which no frame is queued until the next attempt."""
+        """Set a state in which one frame is queued every ``PROBE_NS``; forget those under way."""
         self.state = state
         self._not_before_ns = time.monotonic_ns() + PROBE_NS
         self._under_way.clear()
 
     def _blocked(self) -> bool:
-        """Return whether a frame must not be queued now; a single frame may try now and then."""
+        """Return whether a frame must not be queued now; one every ``PROBE_NS`` may try."""
         now_ns = time.monotonic_ns()
         if now_ns < self._not_before_ns:
             return True
@@ -248,7 +254,7 @@ class Interface:
         return False
 
     def look(self) -> str:
-        """Check carrier and name of the interface; return a line for the log if it was renamed."""
+        """Check name and, without an echo, carrier; return a log line of a new name, else empty."""
         if not self._sockets:
             return ""
         one = self._sockets[0]

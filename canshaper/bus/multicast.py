@@ -29,7 +29,7 @@ class LocalMulticastBus(UdpMulticastBus):
 
     Raises:
         ValueError: the channel is no such group.
-        can.CanInitializationError: the loopback interface is down.
+        can.CanInitializationError: the socket cannot be made: another program holds its port.
     """
 
     def __init__(self, channel: str) -> None:

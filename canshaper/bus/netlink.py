@@ -65,7 +65,9 @@ def request(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
 
 
 def kind_and_bitrates(index: int) -> KindAndBitrates:
-    """Ask the kernel for (kind, bit rate, bit rate of the data phase) of an interface.
+    """Ask the kernel for (kind, bit/s, bit/s of the data phase) of the interface with an index.
+
+    Each is None if the interface has none, such as the bit rates of vcan.
 
     Raises:
         OSError: there is no such interface, or netlink is not permitted.

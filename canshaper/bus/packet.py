@@ -23,7 +23,7 @@ SIZE = CAN_FRAME.size
 FD_FRAME = struct.Struct("=IBB2x64s")
 FD_SIZE = FD_FRAME.size
 WORD = struct.Struct("=I")
-"""The first member of both structures: the id with its flags."""
+"""First member of ``CAN_FRAME`` and ``FD_FRAME``: the id with its flags."""
 BRS, FDF = 0x01, 0x04
 """Flags of a CAN FD frame: bit rate switch for its data; the frame is CAN FD."""
 
@@ -140,7 +140,7 @@ OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 
 
 def read_error(word: int, payload: bytes) -> tuple[FrameFault, BusState | None]:
-    """Return the fault that an error frame reports, and the state of the bus or None.
+    """Return (fault that an error frame reports, state of the bus that it shows or None).
 
     Args:
         word: id of the error frame, with its flags.

@@ -1,7 +1,7 @@
 """An open CAN bus: SocketCAN by raw sockets, every other interface through python-can.
 
-A port counts and reports every error of its bus, and raises none once it is open. It reads and
-sends again at the next tick, and so uses an interface again that comes back.
+A port reports every error of its bus, and raises none once it is open. It reads and sends again at
+the next tick, and so uses an interface again that comes back.
 """
 
 import errno
@@ -41,20 +41,20 @@ class Port(Protocol):
         """
 
     def frames(self) -> Iterator[Frame]:
-        """Yield every frame that waits, in order; end when there is none or the bus fails."""
+        """Yield the waiting data frames in order, 2000 at most; end early if the bus fails."""
 
     def background(self) -> Iterator[Frame]:
-        """Yield frames to read after the valve frames are sent, as of senders with our ids."""
+        """Yield frames to read after the valve frames are sent, as of others with our ids."""
 
     def send(self, frame: Frame) -> bool:
-        """Send now or not at all; False when the frame did not go out."""
+        """Send now or not at all; return whether the kernel or the adapter took the frame."""
 
     @property
     def confirmed(self) -> bool | None:
         """Whether all valve frames sent are on the bus; None if the bus does not say."""
 
     def look(self) -> str:
-        """Check the interface, once a second; return a line for the log, or an empty one."""
+        """Check the interface; return a line for the log, or an empty one. Called once a second."""
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment, with its name of the bus and its messages."""
@@ -145,7 +145,7 @@ class ListeningPort:
         return self._port.arrived_ns
 
     def frames(self) -> Iterator[Frame]:
-        """Yield every frame that waits."""
+        """Yield the waiting data frames in order."""
         return self._port.frames()
 
     def background(self) -> Iterator[Frame]:

@@ -22,7 +22,7 @@ MOST_FAILURES = 20
 
 
 def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
-    """Return the next frame of a bus, or None if none comes in time.
+    """Return the next frame of a bus; None if none comes in ``timeout_s`` (None: wait for ever).
 
     Raises:
         Exception: each interface raises its own classes.
@@ -38,7 +38,10 @@ def receive(bus: Any, timeout_s: float | None = 0.0) -> can.Message | None:
 
 
 def waiting(bus: Any, most: int) -> Iterator[can.Message | Exception | None]:
-    """Yield up to ``most`` waiting frames and errors of the interface; None when none waits."""
+    """Yield up to ``most`` waiting frames and errors of the interface; None when none waits.
+
+    After ``MOST_FAILURES`` errors it ends without None.
+    """
     failures = 0
     for _ in range(most):
         try:
@@ -83,7 +86,10 @@ logging.getLogger("can.interfaces.socketcand.socketcand").addFilter(Changed())
 
 
 class PythonCanPort:
-    """One open bus of python-can, without its Notifier: one exception ends that thread for good."""
+    """One open bus of python-can; arguments as ``open_port``.
+
+    It does without the Notifier of python-can, a thread that one exception ends for good.
+    """
 
     def __init__(
         self,
@@ -114,7 +120,10 @@ class PythonCanPort:
         self._lost = 0
 
     def frames(self) -> Iterator[Frame]:
-        """Yield every frame that waits, in order; end when there is none or the bus fails."""
+        """Yield the waiting data frames in order, but no echoes of ours; report errors.
+
+        It ends after ``MOST_FRAMES`` frames, or after ``MOST_FAILURES`` errors of the interface.
+        """
         # The time stamps of python-can are not used: each interface has its own clock.
         self.arrived_ns = self._arrivals.begin()
         if self._apart and (lost := self._bus.lost) != self._lost:
@@ -150,7 +159,7 @@ class PythonCanPort:
         return iter(())
 
     def send(self, frame: Frame) -> bool:
-        """Send now or not at all; False when the frame did not go out."""
+        """Send now or not at all; return whether the interface, or its thread, took the frame."""
         fd = frame[1:3] in self._fd
         message = can.Message(
             arbitration_id=frame.can_id,

@@ -1,7 +1,7 @@
 """A bus on raw SocketCAN sockets, made for a control loop.
 
-It serves a valve: a frame leaves now or not at all. The port notices frames that do not get onto
-the bus, and queues no more behind them. It uses an interface again that comes back.
+A frame is sent now or not at all. The port notices frames that do not get onto the bus, and queues
+no more behind them. It uses an interface again that comes back.
 """
 
 import socket
@@ -45,7 +45,7 @@ class RawPort(Interface):
         name: name of the bus in the deployment file.
         config: section of the bus in the deployment file.
         on_fault, ids, open_sockets, has_echo: see ``Interface``.
-        fd: messages to send as CAN FD frames.
+        fd: messages to send as CAN FD frames, as (id, whether it has 29 bits).
 
     Attributes:
         arrived_ns: arrival of the last frame that ``frames`` yielded, by ``boottime_ns``.
@@ -76,7 +76,10 @@ class RawPort(Interface):
     # -- receiving -----------------------------------------------------------------------------
 
     def frames(self) -> Iterator[Frame]:
-        """Yield every frame that waits, in order; end when there is none or the bus fails."""
+        """Yield the waiting data frames in order, ``MOST_FRAMES`` at most; end if the bus fails.
+
+        While the interface is gone, try to open it, and yield nothing until that succeeds.
+        """
         if not self._sockets and not self._reopened():
             return
         waiting, receive, arrivals = self._waiting[0], self._receive, self._arrivals
@@ -111,7 +114,7 @@ class RawPort(Interface):
     def background(self) -> Iterator[Frame]:
         """Note which of our frames are on the bus; yield frames to read after the valve frames.
 
-        These are the frames of other senders with our ids, and the frames with unknown ids.
+        These are frames of other senders with our ids, and ``MOST_UNKNOWN`` of unknown ids at most.
         """
         self._errors = 0
         if self._quiet_until_ns and time.monotonic_ns() >= self._quiet_until_ns:
@@ -145,7 +148,7 @@ class RawPort(Interface):
     # -- sending -------------------------------------------------------------------------------
 
     def send(self, frame: Frame) -> bool:
-        """Send now or not at all; False when the frame did not go out."""
+        """Send now or not at all; return whether the kernel queued the frame."""
         if not self._sockets or (self._not_before_ns and self._blocked()):
             return False
         _bus, word, extended, data = frame
@@ -179,7 +182,10 @@ class RawPort(Interface):
             self._up()
 
     def _stuck(self, word: int) -> bool:
-        """Return whether frames of this id have waited too long to queue another one."""
+        """Return whether frames of this id have waited too long to queue another one.
+
+        If so, that is reported; a valve's frames then also block the port (``_block``).
+        """
         waited_ns = self._under_way.waited_ns(word, time.monotonic_ns())
         if not waited_ns:
             return False
@@ -192,10 +198,12 @@ class RawPort(Interface):
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether all valve frames sent are on the bus; None if the bus does not say."""
+        """Whether all valve frames sent are on a working bus; None if the bus does not say."""
         if not self._confirms:
             return None
-        return not any(self._unconfirmed.get(word) for word in self._valves)
+        # Of the frames that a silent bus has dropped, no count is left.
+        waits = any(self._unconfirmed.get(word) for word in self._valves)
+        return not waits and self.state not in SILENT
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment, with its name of the bus and its messages."""

@@ -45,13 +45,13 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
 
     With ``ids`` there are three. The first receives the messages that we read. The second sends; it
     receives our own frames back, frames of other senders with our ids, and the error frames. The
-    third receives unknown ids. So neither our own frames nor a flood of others delays a joystick
-    frame. Without ``ids`` there is one socket for all frames.
+    third receives unknown ids, but on a bus of a gateway nothing. So neither our own frames nor a
+    flood of others delays a joystick frame. Without ``ids`` there is one socket for all frames.
 
     Raises:
         OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD, or the
             bus has valves and the interface confirms no frame.
-        WrongDeviceError: the interface is another device; no frame was sent or received.
+        WrongDeviceError: the device is another one or cannot be read; no frame was handed on.
     """
     opened: list[socket.socket] = []
     try:
@@ -84,14 +84,14 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
 
 
 def check_present(bus: Bus, root: Path = ROOT) -> None:
-    """Check that an interface of that name exists, before a socket is bound to it.
+    """Check that the interface of a bus exists, before a socket is bound to it.
 
     If a process with root's rights binds to an unknown name, the kernel searches for a module that
     provides the interface. That takes up to half a second, in which no axis is driven. An empty
     name would bind to every interface.
 
     Raises:
-        OSError: ENODEV, there is no such interface.
+        OSError: ENODEV, there is no such interface; without /sys only an empty name raises it.
     """
     names = root / "sys/class/net"
     if not bus.channel or (names.is_dir() and not (names / bus.channel).exists()):
@@ -99,7 +99,7 @@ def check_present(bus: Bus, root: Path = ROOT) -> None:
 
 
 def receive_errors(one: socket.socket, classes: int) -> None:
-    """Let a socket receive error frames of these classes only."""
+    """Let a socket receive error frames of these classes only, bits of linux/can/error.h."""
     one.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, classes)
 
 
@@ -124,7 +124,7 @@ def carrier(one: socket.socket) -> bool | None:
 
 
 def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
-    """Return a line that names the new name of a renamed interface; empty if it kept its name."""
+    """Return a log line with an interface's new name; empty if it is gone or still ``channel``."""
     name = one.getsockname()[0]
     if name in ("", channel):
         return ""
@@ -134,7 +134,7 @@ def renamed(one: socket.socket, channel: str, root: Path = ROOT) -> str:
 
 
 def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
-    """Let the three sockets receive these messages."""
+    """Set what each of the three sockets of ``open_sockets`` receives."""
     # If the DBC files have more ids than the kernel allows, the third socket receives them too. The
     # controller distinguishes them from unknown ids.
     ours = ids.received | ids.sent
@@ -158,12 +158,12 @@ def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
 
 
 def filter_words(words: Iterable[tuple[int, int]]) -> bytes:
-    """Return filters in the kernel's format, each from an id and the mask of its tested bits."""
+    """Return filters in the kernel's format from (id with its flags, mask of the tested bits)."""
     return b"".join(_FILTER.pack(word, mask) for word, mask in words)
 
 
 def dropped_frames(sockets: list[socket.socket]) -> int:
-    """Return how many frames the kernel has dropped because a receive queue was full."""
+    """Return how many frames these sockets have lost so far because a receive queue was full."""
     return sum(
         _MEMINFO.unpack(one.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, _MEMINFO.size))[8]
         for one in sockets
@@ -171,7 +171,7 @@ def dropped_frames(sockets: list[socket.socket]) -> int:
 
 
 def readable(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
-    """Return a function that waits so many ms at most, and is true if a socket can be read."""
+    """Return a function that waits so many ms at most; its list is empty if nothing waits."""
     poll = select.poll()
     poll.register(one, select.POLLIN)
     return poll.poll

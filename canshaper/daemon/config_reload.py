@@ -46,7 +46,10 @@ class ConfigReload:
             _read(load, self._file)
 
     def result(self) -> Deployment | str | None:
-        """Return the deployment, or why it is refused (text of lines); None while it is read."""
+        """Return the deployment, or why it is refused (text of lines); None while it is read.
+
+        After ``MOST_S`` kill the process, and refuse. Not allowed after a result.
+        """
         done, status = os.waitpid(self._pid, os.WNOHANG)
         if not done:
             if time.monotonic() < self._until_s:
@@ -72,7 +75,7 @@ class ConfigReload:
 
 
 def _read(load: Callable[[], Deployment], file: BinaryIO) -> NoReturn:
-    """Read the deployment in the forked process, which must not touch the buses and the log."""
+    """Read in the forked process, write the result, and exit; touch neither buses nor log."""
     status = 1
     try:
         _bound()
@@ -86,7 +89,7 @@ def _read(load: Callable[[], Deployment], file: BinaryIO) -> NoReturn:
 
 
 def _bound() -> None:
-    """Limit memory and time of this process."""
+    """Limit memory and processor time of this process; a crash of it writes no core."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     most = pages * resource.getpagesize() + MOST_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (most, most))

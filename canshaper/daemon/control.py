@@ -40,7 +40,7 @@ class Control:
         self._adjuster = Adjuster(controller)
 
     def serve(self, now_ns: int) -> None:
-        """Answer one request, if one waits."""
+        """Answer one request, if one waits; see ``ControlServer.serve``."""
         self._server.serve(self._answer, now_ns)
 
     def close(self) -> None:
@@ -84,7 +84,7 @@ def open_control(
     black_box: BlackBox,
     reporter: Reporter,
 ) -> Control | None:
-    """Open the control socket of a deployment; None if that fails: the machine works without it."""
+    """Open the control socket of a deployment; if that fails, log why and return None."""
     control = deployment.config.control
     assert control is not None  # called for such deployments only
     path = control.path(deployment.path)

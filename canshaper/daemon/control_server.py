@@ -48,7 +48,11 @@ class ControlServer:
         self._poll.register(self._socket, select.POLLIN)
 
     def serve(self, answer: Answer, now_ns: int) -> None:
-        """Accept a new client, and answer one request: that of the client served longest ago."""
+        """Accept a new client, answer one request, and close clients silent for ``SILENT_NS``.
+
+        The client served longest ago comes first. Within ``LEAST_BETWEEN_NS`` of the last request
+        this does nothing.
+        """
         if now_ns < self._not_before_ns:
             return
         waiting = {number for number, _ in self._poll.poll(0)}

@@ -56,7 +56,8 @@ class Daemon:
 
     Raises:
         ConfigError: the deployment is not valid.
-        BusError: a bus cannot be opened. Under a service manager the daemon waits for it instead.
+        BusError: a bus cannot be opened. Under a service manager the daemon waits for its buses
+            instead, but not for the sockets by which it forwards the other frames of a gateway.
     """
 
     def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
@@ -76,6 +77,8 @@ class Daemon:
 
     def run(self) -> None:
         """Run until SIGTERM or SIGINT, then send every valve neutral and close the buses.
+
+        A second signal ends the process at once.
 
         Raises:
             InternalError: a part of the program raised an exception; the end was the same.
@@ -137,7 +140,7 @@ class Daemon:
         return not (self._stop or applied)
 
     def _wait(self, seconds: float) -> None:
-        """Pass frames on until the next deadline, in a gateway."""
+        """Pass frames of a gateway on until the next deadline, in ``seconds``."""
         assert self._line is not None  # called for a gateway only
         self._line.wait(seconds, self._recorder, self._ports, self._standstill)
 
@@ -252,7 +255,8 @@ class Daemon:
         """Send every valve neutral; ``wait`` a moment until the frames are on their buses.
 
         Returns:
-            ``not-sent`` if a frame was not sent; else ``sent``, or after a wait see ``seen_sent``.
+            ``not-sent`` if the gate refused a frame, one was not sent, or we only listen; else
+            ``sent``, or after a wait see ``seen_sent``.
 
         Raises:
             Exception: a neutral frame could not be made; all others were sent first.

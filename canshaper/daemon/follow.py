@@ -57,7 +57,7 @@ class TickFollower:
         self._news = ""
 
     def __call__(self, deadline_ns: int) -> int:
-        """Return by how many ns to move the next deadline; negative for earlier.
+        """Return by how many ns to move the next deadline; negative for earlier, 0 for not.
 
         Args:
             deadline_ns: time of that deadline.
@@ -76,7 +76,7 @@ class TickFollower:
         return max(-self._most_ns, min(self._most_ns, error_ns))
 
     def _measure(self, passed_ns: int) -> None:
-        """Add the time between two frames to the measured cycle; frames between may be lost."""
+        """Add the time between two frames, some lost between; set ``follows`` by their mean."""
         self._frames += 1
         self._cycles += max(1, round(passed_ns / self._cycle_ns))
         self._span_ns += passed_ns
@@ -100,7 +100,10 @@ class TickFollower:
         return news
 
     def _last_of_cluster(self, came_ns: int) -> int:
-        """Return the arrival of the last frame in the cluster that begins with this frame."""
+        """Return when the last frame of other joysticks comes that follows this one closely.
+
+        Each of them comes ``CLUSTER_NS`` after the one before at most, as in the last cycle.
+        """
         cycle_ns = self._cycle_ns
         offsets = [
             (other_ns - came_ns) % cycle_ns
@@ -116,9 +119,9 @@ class TickFollower:
 
 
 def tick_follower(deployment: Deployment, controller: Controller) -> TickFollower | None:
-    """Make the follower of a deployment with ``tick``; None if its joystick has no times.
+    """Make the follower of a deployment with ``tick``; log and return None if it cannot follow.
 
-    The command line may have put its bus on an interface that does not stamp frames.
+    The command line may have put its bus on an interface without time stamps of frames.
     """
     tick = deployment.config.tick
     assert tick is not None  # called for such deployments only

@@ -84,7 +84,10 @@ class Bridge:
         self.sockets = opened
 
     def pass_on(self) -> int:
-        """Pass on some of the waiting frames; return how many."""
+        """Pass on ``MOST_AT_ONCE`` frames of each bus at most; return how many were read.
+
+        While an interface is gone, try to open both again.
+        """
         if not self.sockets:
             self._reopen()
         count = 0
@@ -127,9 +130,11 @@ class Bridge:
 class InlineGateway:
     """An inline gateway: it forwards frames, or checks the rules by which the kernel does.
 
+    Unless both buses are of SocketCAN, it warns, and no frame of others passes.
+
     Args:
         deployment: a deployment with a gateway.
-        on_fault: called with every fault.
+        on_fault: called for every frame that the daemon could not pass on.
 
     Raises:
         BusError: an interface cannot be opened.
@@ -181,11 +186,11 @@ class InlineGateway:
             )
 
     def pass_others(self) -> int:
-        """Pass on some frames of others, unless the kernel does; return how many."""
+        """Pass on some frames of others, unless the kernel does; return how many were read."""
         return self._bridge.pass_on() if self._bridge else 0
 
     def check(self, now_ns: int, *, neutral: bool) -> None:
-        """Log when the rules of the kernel differ from those of the deployment.
+        """Log when the kernel's rules begin or cease to differ from those of the deployment.
 
         The check takes a part of a tick, so it is rare, and made only while no axis moves.
         """
@@ -204,7 +209,7 @@ class InlineGateway:
 
 
 def rules_fault(expected: list[Rule]) -> str:
-    """Return the faults of the kernel's rules as a part of a log line; empty if they are right."""
+    """Return what is wrong with the kernel's rules, or why they cannot be read; empty if right."""
     try:
         present = between({rule.source for rule in expected}, rules())
     except GatewayError as error:

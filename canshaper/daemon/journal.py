@@ -20,7 +20,9 @@ PRIORITY = {logging.DEBUG: "<7>", logging.INFO: "<6>", logging.WARNING: "<4>"}
 
 
 class JournalHandler(logging.Handler):
-    """Writes lines to a file descriptor, as far as that takes them at once.
+    """Writes lines to a file descriptor, as far as that takes them at once; keeps the others.
+
+    Beyond ``MOST_LINES`` it drops lines, and later logs how many.
 
     Args:
         fd: file descriptor to write to.
@@ -49,7 +51,7 @@ class JournalHandler(logging.Handler):
         self.flush()
 
     def flush(self) -> None:
-        """Write lines while the descriptor takes them at once; if writing fails, drop all lines."""
+        """Write lines while the descriptor takes them at once; if writing fails, drop them all."""
         while self._lines and any(events & select.POLLOUT for _, events in self._poll.poll(0)):
             line = self._lines[0]
             try:

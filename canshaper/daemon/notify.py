@@ -45,7 +45,7 @@ class ServiceManager:
         return self._socket is not None
 
     def waiting(self, status: str) -> None:
-        """Report that the service waits for an adapter, under the longer limit of the watchdog."""
+        """Report the service as ready while it waits for an adapter; the watchdog waits longer."""
         limit = f"\nWATCHDOG=1\nWATCHDOG_USEC={RELOAD_US}" if self._limit_us else ""
         self._send(f"READY=1\nSTATUS={status}{limit}")
 
@@ -67,7 +67,7 @@ class ServiceManager:
         self._send(f"STATUS={text}")
 
     def ping(self, now_ns: int) -> None:
-        """Report that the control loop is alive, no more often than the watchdog requires."""
+        """Report every quarter of the watchdog's limit that the loop lives; repeat unsent ones."""
         if self._unsent:
             self._send_surely(self._unsent)
         if self._ping_ns and now_ns >= self._next_ping_ns:

@@ -33,7 +33,7 @@ def open_ports(
     """Return the ports of a deployment by name of the bus; open only those that are not open yet.
 
     Args:
-        deployment: the deployment; if it only listens, its ports send no valve frame.
+        deployment: the deployment; if it only listens, ports opened for it send no valve frame.
         opened: open ports by section of the bus.
         on_fault: called with every fault of a bus.
 
@@ -89,7 +89,7 @@ def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Por
 
 
 def waiting(ports: Iterable[Port]) -> list[Frame]:
-    """Read all frames that wait in ports."""
+    """Read ports once, and return the frames that waited in them."""
     return [frame for port in ports for frame in (*port.frames(), *port.background())]
 
 
@@ -99,7 +99,7 @@ def taken_over(
     deployment: Deployment,
     read: Callable[[list[Frame]], None],
 ) -> list[Frame] | None:
-    """Change to the ports of another deployment, and close those that it does not have.
+    """Let ports serve another deployment, and close those that it does not have.
 
     Args:
         ports: ports of the other deployment by name of the bus.
@@ -108,8 +108,8 @@ def taken_over(
         read: called with the frames that wait in ports before they are closed.
 
     Returns:
-        Frames that wait in new ports; None without a new port. Frames with our ids are left out:
-        the ports so far sent them, but to a new port they look like those of a second sender.
+        Frames that already wait in new ports, but for those with our ids; None without a new port.
+        The ports so far sent those, but to a new port they look like those of a second sender.
     """
     if closed := [port for port in opened.values() if port not in ports.values()]:
         read(waiting(closed))
@@ -149,7 +149,7 @@ def close_ports(ports: Iterable[Port]) -> None:
 
 
 def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> bool:
-    """Send neutral frames; try again for a while if a queue is full, and log what was not sent.
+    """Send neutral frames, for ``NEUTRAL_TRIES_S`` again where one fails; log what was not sent.
 
     Returns:
         Whether all were sent.
@@ -167,15 +167,15 @@ def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> bool:
 
 
 def seen_sent(ports: Iterable[Port], receive: Callable[[Frame], object]) -> str:
-    """Wait a moment until the valve frames that were sent are confirmed.
+    """Wait until the valve frames that were sent are confirmed, ``ON_THE_BUS_S`` at most.
 
     Args:
         ports: ports of the buses.
         receive: called with every frame that comes meanwhile.
 
     Returns:
-        ``neutral`` if every frame is on its bus, ``not-confirmed`` if one is not, ``sent`` if a bus
-        confirms no frames.
+        ``not-confirmed`` if a frame is not on its bus; else ``sent`` if a bus confirms no frames;
+        else ``neutral``: every frame is on its bus.
     """
     until = time.monotonic() + ON_THE_BUS_S
     while True:

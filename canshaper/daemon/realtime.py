@@ -43,7 +43,7 @@ class Collector:
         gc.disable()
 
     def pause(self, now_ns: int) -> None:
-        """Collect the objects made since the start, if the last time was long enough ago."""
+        """Collect the objects made since ``freeze``, every ``PERIOD_NS`` at most."""
         if now_ns >= self._next_ns:
             self._next_ns = now_ns + self.PERIOD_NS
             gc.collect()
@@ -85,7 +85,7 @@ def drop_capabilities() -> None:
 def lock_memory() -> str | None:
     """Keep all memory of the process in RAM; return None, or why that failed.
 
-    It is not tried under a limited RLIMIT_MEMLOCK: the kernel would refuse memory needed later.
+    Only root tries it under a limited RLIMIT_MEMLOCK: to others the kernel refuses memory later.
     """
     soft, _hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if soft != resource.RLIM_INFINITY and os.geteuid() != 0:

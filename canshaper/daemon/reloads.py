@@ -29,7 +29,7 @@ class Reloads:
         self._waiting_logged = False
 
     def request(self) -> None:
-        """Begin a reload at the next step; a signal handler may call this."""
+        """Begin a reload at the next step in neutral; a signal handler may call this."""
         self._requested = True
 
     def step(self, *, neutral: bool) -> None:

@@ -64,7 +64,7 @@ class Reporter:
                 log.log(level, "bus=%s state=%s%s", name, state.value, why)
 
     def faults(self, now_ns: int) -> None:
-        """Log the last fault of a frame if it is another one, at most one a second."""
+        """Log the last fault counted if it is not the last one logged, one a second at most."""
         counters = self._controller.counters
         fault = counters.last_fault
         if fault is not self._logged_fault and now_ns >= self._log_again_ns:
@@ -78,7 +78,7 @@ class Reporter:
         self._latest_ns = max(self._latest_ns, late_ns)
 
     def status(self, now_ns: int, trouble: Callable[[], list[str]]) -> bool:
-        """Renew the status line once a second; return whether it was time.
+        """Renew the status line once a second, log news of the buses; return whether it was time.
 
         Args:
             now_ns: time of the tick.
@@ -102,7 +102,7 @@ class Reporter:
         self._status_ns = boottime_ns() + SECOND_NS
 
     def numbers(self) -> dict[str, Any]:
-        """Return state, counters and lateness as plain data for a client."""
+        """Return axes (values: parts of full speed), buses, counters, lateness (s) for a client."""
         controller = self._controller
         return {
             "digest": controller.deployment.identity.digest,
@@ -123,7 +123,7 @@ class Reporter:
         }
 
     def refused(self, why: str) -> None:
-        """Log why a reload is refused, line by line."""
+        """Log why a reload is refused, line by line; the status line shows the first for 1 s."""
         lines = why.splitlines()
         for line in lines:
             log.error("reload=refused %s", line)
@@ -131,7 +131,7 @@ class Reporter:
         self.hold_status()
 
     def identity(self) -> None:
-        """Log the hashes of program and deployment; compare them with the accepted machine."""
+        """Log the hashes of program and deployment, warnings of DBC files, and unfit filters."""
         deployment = self._controller.deployment
         for line in deployment.identity.lines():
             log.info("identity %s", line)
@@ -143,7 +143,7 @@ class Reporter:
             log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
 
     def _summary(self, trouble: list[str]) -> str:
-        """Return the status line: axes, buses, lateness of the last second, missed deadlines."""
+        """Return the status line: ``trouble``, axes, buses, lateness (us), missed deadlines."""
         axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
         buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
         late = f"late {self._latest_ns / 1000:.0f} us"

@@ -40,14 +40,14 @@ class DrivenAxis(Protocol):
 
     @property
     def feedback(self) -> Feedback | None:
-        """Feedback of its valve."""
+        """Feedback of its valve; None without one."""
 
     @property
     def stops(self) -> StopCauses:
         """Causes that stop the axis or keep it from starting."""
 
     def put(self, steps: int) -> None:
-        """Put a command (raw steps) into the message of its valve."""
+        """Put a setpoint (steps of its signal) into the message of its valve."""
 
     def measured_by(self, node: "SensorNode") -> None:
         """Use measurements of its sway sensor only while this node works."""
@@ -57,7 +57,7 @@ class FrameHandler(Protocol):
     """Receives frames that no exact identifier selects, such as those of a J1939 group."""
 
     def receive(self, frame: Frame, arrived_ns: int, /) -> FrameFault:
-        """Receive a frame, and return its fault."""
+        """Receive a frame, and return its fault or NONE."""
 
 
 class ForwardingRule(Protocol):
@@ -74,10 +74,10 @@ class ForwardingRule(Protocol):
         """Return the joystick's frame with our velocities; these are 0 where ``stopped``."""
 
     def own(self, now_ns: int) -> Frame | None:
-        """Return a frame of our own where joystick frames are missing and a motion has to end."""
+        """Return a frame of our own if joystick frames are missing while a motion has to end."""
 
     def last(self) -> list[Frame]:
-        """Return the last frames before we leave the bus."""
+        """Return the neutral frames to send last; none unless the last frame may move a valve."""
 
 
 class BusProtocol:
@@ -107,7 +107,7 @@ class BusProtocol:
         raise NotImplementedError
 
     def silence(self, now_ns: int) -> FrameFault:
-        """Return a fault where another node has just fallen silent."""
+        """Return a fault if another node has just fallen silent, else NONE."""
         return FrameFault.NONE
 
     def frames(self, now_ns: int) -> Iterable[Frame]:
@@ -134,5 +134,5 @@ class BusProtocol:
         """Prepare the end: the next frame of every valve is the last one."""
 
     def parts(self, places: Mapping[str, PartKey]) -> Iterator[tuple[PartKey, Part]]:
-        """Yield parts that a reload carries over besides ``inputs``; ``places``: keys by bus."""
+        """Yield (key, part) for a reload, not of ``inputs``; ``places``: key of a bus by name."""
         yield from ()

@@ -21,7 +21,7 @@ def protocols(
         deployment: the machine.
         axes: axes of the machine; protocols add interlocks to them.
         joysticks: joysticks of the machine.
-        inputs: inputs of the machine, each as bound and as received.
+        inputs: (bound message, receiver of its frames) of each input of the machine.
     """
     config = deployment.config
     canopen, bound = None, [*inputs]

@@ -13,12 +13,17 @@ import pytest
 
 from canshaper.blackbox import keeper, write
 from canshaper.blackbox.file import read_box
+from canshaper.blackbox.state import States
 from canshaper.codec.frame import BusState
 from canshaper.controller.controller import Controller
+from canshaper.controller.events import StateEvent
+from canshaper.controller.gated import GatedController
 from canshaper.daemon.reporter import Reporter
+from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
 from canshaper.recording.log import LogFile
 from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.states import Reason, State, Transition
 from tests.blackbox.driven import SECOND, TRIP, drive, inside, replayed
 from tests.daemon.bench import Bench, FakePort
 
@@ -298,3 +303,30 @@ def test_frames_that_were_not_sent_are_not_sent_again(
     assert len(off) == 10
     assert "state=TRIPPED from=ACTIVE reason=SEND_FAILED" in verified(folder)
     assert len(off) == 20
+
+
+def test_a_controller_that_can_no_longer_be_saved_ends_the_box_and_not_the_loop(
+    bench: Bench, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It trips while a file that had failed is written, and the state of that tick is refused."""
+    tripped = StateEvent("slew", Transition(State.ACTIVE, State.TRIPPED, Reason.SEND_FAILED))
+    ends = [(1, errno.ENOSPC << 8), (1, 0)]
+    monkeypatch.setattr(keeper.os, "fork", lambda: 1)
+    monkeypatch.setattr(keeper.os, "waitpid", lambda *_: ends.pop(0))
+    controller = Controller(load_deployment(bench.file))
+    box = keeper.BlackBox(folder)
+    box.around(GatedController(controller), controller)
+    box.begin(0)
+    box.after_tick(1, [tripped], neutral=False)
+    box.after_tick(2, (), neutral=True)
+    assert box.fault == os.strerror(errno.ENOSPC)
+    box.after_tick(2 + keeper.RETRY_NS, (), neutral=True)
+
+    def refused(states: States) -> bytes:
+        raise StateError("no state")
+
+    monkeypatch.setattr(States, "save", refused)
+    box.after_tick(keeper.STATE_NS, [tripped], neutral=True)
+    assert ends == []
+    box.after_tick(keeper.STATE_NS + 1, (), neutral=True)
+    assert (box.fault, box.report()["waits"]) == ("", False)

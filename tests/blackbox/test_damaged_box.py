@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.blackbox.file import HEAD, MAGIC
+from canshaper.blackbox.file import HEAD, MAGIC, read_box
 from canshaper.blackbox.ring import RECORD, Kind, records
 from canshaper.blackbox.state import States
 from canshaper.cli.app import app
 from canshaper.controller.controller import Controller
 from canshaper.controller.gated import GatedController
 from canshaper.daemon.daemon import Daemon
-from canshaper.errors import StateError
+from canshaper.errors import BoxError, StateError
 from canshaper.machine.binding import load_deployment
 from tests.blackbox.driven import inside, replayed
 from tests.rigs.files import ROOT
@@ -102,6 +102,17 @@ def test_one_of_another_program_that_lacks_something_says_of_which(
     assert re.search(
         r"segment 1: .*; it was recorded by program=.*: play it with that version", text
     )
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["[]", "1", '"a"', '{"buses": [], "identity": [], "time_ns": 1e999}', '{"buses": 1}', "{", ""],
+)
+def test_a_header_of_other_content_is_reported(tmp_path: Path, header: str) -> None:
+    path = tmp_path / "other.blackbox"
+    path.write_bytes(MAGIC + header.encode() + b"\n")
+    with pytest.raises(BoxError, match=r"other\.blackbox: header: expected what canshaper writes"):
+        read_box(path)
 
 
 class Hostile:

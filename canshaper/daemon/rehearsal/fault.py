@@ -18,7 +18,7 @@ MS, S = 1_000_000, 1_000_000_000
 SLACK = 0.05
 
 Asked = Mapping[str, float]
-"""Demands by signal: a velocity in [-1, 1]; for a switch, 1 if it allows motion, otherwise 0."""
+"""Demands by input and signal: a velocity in [-1, 1]; 1 for a switch that allows motion, else 0."""
 Alter = Callable[[Frame], tuple[Frame, ...]]
 """Function that returns the frames to receive instead of a frame."""
 Begin = Callable[[Recorder, int], object]
@@ -33,16 +33,16 @@ class Fault:
         name: name by which a person requests it, KIND:PART.
         claim: its row in the table of reactions, see docs/safety.md.
         axes: axes of which one has to move; if empty, every axis has to be at rest.
-        within_ns: time in which the reaction has to begin.
+        within_ns: time from the first altered input in which the reaction has to begin.
         alter: returns the frames to receive instead of a frame.
         once: whether only one frame is altered.
         age_ns: time by which an altered frame arrives earlier.
         begin: makes the fault once.
-        end: frame of another sender that ends the fault.
-        late: numbers of the ticks that are late.
+        end: frame received at the end, as of another sender, unless that has sent one itself.
+        late: numbers of the ticks that are late, from 0 when the fault is made.
         stands: whether the late ticks are a standstill, in which no frame is read.
-        unsent: whether frames are reported as not sent, although they are sent.
-        lasts_ns: time after which it is over by itself; 0: with its reaction.
+        unsent: whether valve frames are reported as not sent, although they are sent.
+        lasts_ns: time after which it is over by itself; 0: see ``rehearsed_faults``.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Editor:
         return frame._replace(data=data)
 
     def counted(self, frame: Frame, new: Callable[[int], int]) -> Frame:
-        """Return a frame with another alive counter; ``new`` computes it from its own one."""
+        """Return a frame with a right checksum and another counter: ``new`` of its own, wrapped."""
         check, counts = self._protection.check, self._protection.counts
         if isinstance(check, E2e):
             count = new(check.count(frame.data)) % counts
@@ -117,7 +117,7 @@ def no_more(altered: Asked, real: Asked) -> bool:
 
 
 def takes_back(real: Asked, applied: Asked) -> bool:
-    """Return whether a frame demands less than what is applied, or the opposite direction."""
+    """Return whether a frame demands the opposite of what is applied, or less by ``SLACK``."""
     pairs = [(of, applied.get(key, 0.0)) for key, of in real.items()]
     return any(was and (of * was <= 0.0 or abs(of) < abs(was) - SLACK) for of, was in pairs)
 
@@ -162,7 +162,7 @@ class Demands:
             self._bands[key] = min(band, self._bands.get(key, 1.0))
 
     def read(self, frame: Frame) -> Asked:
-        """Return the demands of a frame; empty for a frame that has none."""
+        """Return the demands of a frame, 0 for a neutral or invalid one; empty if it has none."""
         for name, editor, velocities, switches in self._inputs:
             if editor.has(frame):
                 raw = editor.raw(frame)
@@ -171,7 +171,7 @@ class Demands:
         return {}
 
     def held(self, controller: Controller, now_ns: int) -> Asked:
-        """Return the demands of the last good frames of a controller, while they are fresh."""
+        """Return the demands of the joysticks that a controller has not lost, as it holds them."""
         held: dict[str, float] = {}
         for name, joystick in controller.joysticks.items():
             if joystick.lost(now_ns) is None:
@@ -217,7 +217,7 @@ def put(editor: Editor, values: Mapping[str, Any]) -> Alter:
 
 
 def sent(frame: Frame) -> Begin:
-    """Return a function that receives a frame, as from another sender."""
+    """Return a function that lets the recorder receive a frame, as from another sender."""
     return lambda recorder, now_ns: Recorder.receive(recorder, frame, now_ns)
 
 

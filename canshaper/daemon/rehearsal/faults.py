@@ -22,10 +22,10 @@ ACTIVE = ids.ValveState.ACTIVE.value
 
 
 def rehearsed_faults(deployment: Deployment) -> dict[str, Fault]:
-    """Return every fault that can be made on the input side of a machine, by name.
+    """Return every fault that can be made on the input side of this machine, by name.
 
-    Faults after which the daemon has to be restarted are the last ones. A fault without a time of
-    its own lasts until the reaction is over.
+    Faults after which the daemon has to be restarted are the last ones. Where ``lasts_ns`` is 0, it
+    becomes ``within_ns``, plus the longest ``stop_s`` of an axis, plus 1 s.
     """
     demands, faults = Demands(deployment), list[Fault]()
     for joystick in deployment.joysticks.values():

@@ -111,7 +111,7 @@ def _frozen(editor: Editor, joystick: BoundJoystick, demands: Demands) -> Alter:
 
 
 def fault_codes(joystick: BoundJoystick) -> dict[Reason, dict[str, dict[str, Any]]]:
-    """Return raw values that are no measurement of a velocity, by reason and by velocity."""
+    """Return raw values that are no measurement: {reason: {velocity: {signal: raw value}}}."""
     found: dict[Reason, dict[str, dict[str, Any]]] = {}
     for velocity in joystick.velocities:
         for part in _parts(velocity):

@@ -37,7 +37,7 @@ NOTHING = Fault("", "", (), 0)
 
 
 class Rehearsal(Recorder):
-    """A recorder that alters received frames by at most one fault; arguments as ``Recorder``."""
+    """A recorder that makes one fault at a time on the input side; arguments as ``Recorder``."""
 
     def __init__(self, gated: GatedController, controller: Controller, ring: Ring) -> None:
         super().__init__(gated, controller, ring)
@@ -62,15 +62,17 @@ class Rehearsal(Recorder):
     # -- requests of a client ---------------------------------------------------------------------
 
     def rehearse(self, what: object, who: str) -> Mapping[str, Any]:
-        """Arm a fault by its name, or report on the armed one.
+        """Arm a fault by its name, end the present one, or report on it.
 
         Args:
-            what: name of a fault, ``report`` or ``end``. A client that asks nothing for some
-                seconds counts as gone, which ends the fault.
+            what: name of a fault, ``report``, or ``end``, which trips axes that move. A client that
+                asks nothing for ``GONE_NS`` counts as gone: the fault ends in the same way.
             who: text that names the client in the log.
 
         Returns:
-            Phase of the fault, whether it was made, time until neutral, events, why it ended.
+            ``phase``; ``made``: whether an input was altered; ``neutral_ms``: time from then until
+            the valves of its axes are neutral, or None; ``events``: each [ms from then, axis,
+            state, reason or text]; ``why`` it ended.
 
         Raises:
             ValueError: the fault cannot be armed; no state has changed.
@@ -122,7 +124,10 @@ class Rehearsal(Recorder):
     # -- frames and ticks ------------------------------------------------------------------------
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Receive a frame as the fault alters it; return the frame for the other bus, or None."""
+        """Receive a frame as the fault alters it; return the frame for the other bus, or None.
+
+        A frame that takes a demand back ends the fault; see ``Demands``.
+        """
         fault = self._fault
         if self._phase == DONE:
             return super().receive(frame, now_ns)
@@ -198,7 +203,7 @@ class Rehearsal(Recorder):
             self._made_ns = now_ns
 
     def _step(self, now_ns: int) -> None:
-        """Enter the next phase if it is time."""
+        """Go on from armed to made, over and done if it is time."""
         lasted_ns = now_ns - self._since_ns
         if self._phase == OVER:
             stops = any(event[2] in STOPS for event in self._events)
@@ -215,7 +220,7 @@ class Rehearsal(Recorder):
             self._end("its time is over")
 
     def _held(self, now_ns: int) -> bool:
-        """Return whether to make the fault now: an axis of it has moved, or all are at rest."""
+        """Return whether its axis moved for ``HELD_NS``; without one, whether every axis rests."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
         if not any(one.state is State.ACTIVE and abs(one.demand) >= LEAST_DEMAND for one in axes):
             self._still_ns = now_ns
@@ -230,7 +235,7 @@ class Rehearsal(Recorder):
             self._made(now_ns)
 
     def _look(self, now_ns: int) -> None:
-        """Note the events since the fault was made, and when its valves are neutral."""
+        """Note the events of this tick after the first altered input, and when all is neutral."""
         if self._made_ns is None:
             return
         since_ms = (now_ns - self._made_ns) / MS
@@ -245,6 +250,6 @@ class Rehearsal(Recorder):
 
     @property
     def _neutral(self) -> bool:
-        """Whether the valves of its axes are neutral and stay neutral."""
+        """Whether the valves of the fault's axes are neutral and stay neutral."""
         axes = [self._controller.axes[name].axis for name in self._fault.axes]
         return all(one.neutral and not one.output.steps for one in axes)

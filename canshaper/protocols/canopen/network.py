@@ -67,7 +67,10 @@ class ValveControl(Input):
         self._go(0, None)
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Store the valve's state (low four bits); a state but ACTIVE counts in any frame."""
+        """Store the valve's state (low four bits of the status word) if the frame is accepted.
+
+        After another state than ACTIVE, even in a refused frame, ``gate`` once lets nothing move.
+        """
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
         if accepted:
@@ -75,7 +78,7 @@ class ValveControl(Input):
         return GOOD
 
     def gate(self, neutral: bool, now_ns: int) -> Reason | None:
-        """Return why the axis may not move, or None; advance the control word when it is time."""
+        """Return why the axis may not move, or None; advance the control word when it is due."""
         if self._state is None or now_ns - self._state_ns > self._status_timeout_ns:
             self.resync()
         self._next(now_ns)
@@ -86,7 +89,7 @@ class ValveControl(Input):
         return Reason.VALVE_NOT_READY if neutral else Reason.VALVE_FAULT
 
     def _next(self, now_ns: int) -> None:
-        """Take the next step, start again, or reset the valve's fault."""
+        """Put the next control word if it is due: a step, INIT again, or a reset of a fault."""
         if self._since_ns is None:
             self._since_ns = now_ns
         passed_ns = now_ns - self._since_ns
@@ -125,7 +128,7 @@ class ValveControl(Input):
             self._message.raw[self._control] = int(ValveState.HOLD)
 
     def invalidate(self) -> None:
-        """Invalidate everything received so far."""
+        """Invalidate everything received so far, and start from INIT."""
         super().invalidate()
         self.resync()
 
@@ -139,9 +142,9 @@ class CanopenNetwork(BusProtocol):
             interlocks of each; its sway sensor counts only while the sensor's node works.
 
     Attributes:
-        nodes: our node on each bus of CANopen, by bus.
+        nodes: our node and the others on each bus of CANopen, by bus.
         controls: the state machine of a valve of CiA 408, by the name of its axis.
-        bound: the same state machines, each with its status message.
+        bound: (status message, state machine) of the same valves.
     """
 
     def __init__(self, deployment: Deployment, axes: Mapping[str, DrivenAxis]) -> None:
@@ -188,7 +191,7 @@ class CanopenNetwork(BusProtocol):
         )
 
     def silence(self, now_ns: int) -> FrameFault:
-        """Return a fault if a node has just fallen silent."""
+        """Return HEARTBEAT_LOST if a node has just fallen silent, else NONE."""
         lost = sum(nodes.lost(now_ns) for nodes in self.nodes.values())
         return FrameFault.HEARTBEAT_LOST if lost else FrameFault.NONE
 
@@ -232,7 +235,7 @@ class NodeGate:
         self._stops, self._alarms = node.stops, node.alarms
 
     def __call__(self, neutral: bool, _now_ns: int) -> Reason | None:
-        """Return the reason, or None; a failure since the last call counts, however short."""
+        """Return why the axis may not move, or None; a failure since the last call counts, too."""
         node = self._node
         stopped, alarmed = node.stops != self._stops, node.alarms != self._alarms
         self._stops, self._alarms = node.stops, node.alarms

@@ -1,4 +1,4 @@
-"""Our node on a bus of CANopen: heartbeats, emergencies, and starting the others (CiA 301)."""
+"""CANopen nodes of a bus (CiA 301): our heartbeat; others' heartbeats, emergencies, start."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -41,8 +41,8 @@ class RemoteNode:
     """Another node, as its heartbeats and emergency messages show it.
 
     Attributes:
-        state: state in its last heartbeat; None before the first one, and after silence.
-        emergency: error code of its last emergency message, 0 for none.
+        state: state in its last heartbeat; None before it, after silence, or once invalidated.
+        emergency: last error code that it has not reported as over, 0 for none.
         stops: how often it reported a state other than OPERATIONAL, or fell silent.
         alarms: how often it reported an error.
     """
@@ -72,7 +72,7 @@ class RemoteNode:
         return FrameFault.NONE
 
     def alarm(self, data: bytes, _arrived_ns: int) -> FrameFault:
-        """Receive an emergency message.
+        """Receive an emergency message; a new error is a fault.
 
         Error code 0 says that one error is over; all are over only if the error register is 0 too.
         """
@@ -101,7 +101,7 @@ class RemoteNode:
         self.state = None
 
     def copy_state(self, before: Self) -> None:
-        """Copy state, emergency and times of the same node."""
+        """Copy state, emergency and times of the same node; ``stops`` and ``alarms`` count anew."""
         self.state, self.emergency = before.state, before.emergency
         self._last_frame_ns, self._start_ns = before._last_frame_ns, before._start_ns
 
@@ -140,7 +140,7 @@ class CanopenBus:
     Attributes:
         own: our node id.
         nodes: the other nodes, by name.
-        inputs: receivers of the other nodes' messages, by id.
+        inputs: receivers of the other nodes' heartbeats and emergency messages, by CAN id.
     """
 
     def __init__(self, bus: str, config: Canopen) -> None:
@@ -179,7 +179,7 @@ class CanopenBus:
         return sum(node.lost(now_ns) for node in self.nodes.values())
 
     def changes(self) -> Iterator[NodeEvent]:
-        """Yield events of nodes that have changed since the last call."""
+        """Yield events of nodes whose state or emergency has changed since the last call."""
         for name, node in self.nodes.items():
             state = "lost" if node.state is None else _name(node.state)
             status = f"state={state} emergency={node.emergency:#06x}"

@@ -40,8 +40,8 @@ class Rule:
         destination: interface that the frames go to.
         pattern: ids of the frames that the rule passes.
         changes: (number, content) of each netlink attribute that changes the frames.
-        flags: flags of the rule.
-        hops: how many rules may pass one frame on.
+        flags: flags of ``struct rtcanmsg``, linux/can/gw.h.
+        hops: how many rules may pass one frame on; 0: the rule sets no limit.
     """
 
     source: str
@@ -54,7 +54,7 @@ class Rule:
     hops: int = 1
 
     def __str__(self) -> str:
-        """Text for people."""
+        """Return interfaces, value:mask of the ids (hex), and whether frames change, for people."""
         word, mask = self.pattern.value, self.pattern.mask
         changed = ", changed" if self.changes else ""
         return f"{self.source} -> {self.destination} {word:x}:{mask:x}{changed}"
@@ -77,7 +77,7 @@ def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], 
 
 
 def load_module() -> None:
-    """Load the module can-gw, if it is neither built into the kernel nor loaded."""
+    """Load the module can-gw, unless the kernel has it; say nothing if that fails."""
     if not Path("/sys/module/can_gw").exists():
         subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # _change says why
 
@@ -155,7 +155,7 @@ def make(interfaces: Iterable[str], expected: Iterable[Rule]) -> tuple[list[Rule
         (removed rules, added rules).
 
     Raises:
-        GatewayError: the kernel refuses.
+        GatewayError: the kernel refuses; the rules before that one are changed.
     """
     more, missing = difference(between(interfaces, rules()), expected)
     for rule in more:
@@ -177,6 +177,6 @@ def difference(present: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[
 
 
 def between(names: Iterable[str], rules: Iterable[Rule]) -> list[Rule]:
-    """Return the rules that lead from one of these interfaces to another of them."""
+    """Return the rules whose source and destination are both among these interfaces."""
     ends = {*names}
     return [rule for rule in rules if {rule.source, rule.destination} <= ends]

@@ -57,8 +57,8 @@ class ForwardedJoystick:
 
         Args:
             data: bytes of the frame.
-            arrived_ns: monotonic time at which the frame arrived.
-            stopped: whether the emergency stop is pressed, or missing.
+            arrived_ns: time by ``boottime_ns`` at which the frame arrived.
+            stopped: whether the emergency stop is pressed, or missing; then all velocities are 0.
         """
         self._passed_ns = arrived_ns
         stopped = stopped or self._joystick.releases != self._releases  # they trip with the tick
@@ -69,7 +69,7 @@ class ForwardedJoystick:
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:
-        """Return a frame of our own where joystick frames are missing and a motion has to end."""
+        """Return a frame of our own if joystick frames are missing while a motion has to end."""
         self._releases = self._joystick.releases
         stopping = any(control.axis.state in MOVING for control in self._controls)
         tripped = any(control.axis.state is State.TRIPPED for control in self._controls)
@@ -81,7 +81,7 @@ class ForwardedJoystick:
         return self._message.own(enabled=stopping)
 
     def last(self) -> list[Frame]:
-        """Return the last frames before we leave: neutral, if the last frame may move a valve."""
+        """Return the neutral frame to send last; none unless the last frame may move a valve."""
         return [self._message.own(enabled=False)] if self.moves else []
 
     def _any_moves(self) -> bool:
@@ -126,7 +126,7 @@ class Gateway(BusProtocol):
 
 @dataclass(frozen=True, slots=True, order=True)
 class Pattern:
-    """Ids that equal ``value`` in the bits of ``mask``, as in ``struct can_filter``.
+    """Ids, with their flag, that equal ``value`` in the bits of ``mask`` (``struct can_filter``).
 
     The mask has the flag of 29-bit ids, but not that of remote frames: a pattern fits these too.
     """

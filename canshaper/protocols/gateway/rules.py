@@ -12,7 +12,7 @@ from canshaper.protocols.gateway.forwarding import Pattern, all_but, exactly
 
 
 def excluded(deployment: Deployment) -> frozenset[Pattern]:
-    """Return the frames that the gateway never passes unchanged, in either direction.
+    """Return patterns of the frames that the gateway does not pass while the daemon runs.
 
     These are the frames of the joysticks, which only the daemon forwards; all frames that we send,
     so that no one else can send them through the gateway; and those that the deployment blocks.
@@ -42,7 +42,7 @@ def excluded(deployment: Deployment) -> frozenset[Pattern]:
 
 
 def patterns(deployment: Deployment) -> list[Pattern]:
-    """Return the frames that the gateway passes unchanged, in both directions."""
+    """Return patterns of all other frames; the gateway passes them unchanged in both directions."""
     return all_but(excluded(deployment))
 
 
@@ -53,7 +53,7 @@ def passing_rules(deployment: Deployment) -> list[Rule]:
 
 
 def fallback_rules(deployment: Deployment) -> list[Rule]:
-    """Return the kernel's rules for the frames of the joysticks while the daemon is away."""
+    """Return the kernel's rules for joystick frames while the daemon is away; none: they stop."""
     gateway = deployment.config.gateway
     assert gateway is not None
     rules = []
@@ -105,7 +105,7 @@ def channels(deployment: Deployment) -> tuple[str, str]:
 
 
 def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
-    """Return the changes that put all axes in a joystick's frame into neutral."""
+    """Return the ``changes`` of a rule that put all axes in a joystick's frame into neutral."""
     length = message.fields.message.length
     checks, clear = kernel_check(message.protection, length)
     return (*changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length), *checks)

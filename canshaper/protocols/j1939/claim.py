@@ -50,13 +50,13 @@ class AddressClaim:
         bus: name of the bus.
         config: address and NAME.
         answered: groups (PGN) that other parts of ours send on request.
-        cyclic: groups (PGN) that we send cyclically; the next cycle answers a request.
+        cyclic: groups (PGN) that we send anyway; no request for one of them is refused.
         guest: whether the address may belong to another node: we ask first, claim it only if no
             one answers, give it up to any node that claims it, whatever its NAME, and refuse
             nothing.
 
     Attributes:
-        state: state of our address; unless it is CLAIMED, we may send claims only.
+        state: state of our address; unless it is CLAIMED, we may send only what ``frames`` yields.
         requested: groups among ``answered`` that were requested since the owner emptied the set.
     """
 
@@ -142,14 +142,14 @@ class AddressClaim:
             self._refused.append((pgn, source))
 
     def _claim_at(self, time_ns: int) -> None:
-        """Schedule a claim; a claim that is due earlier stays due."""
+        """Schedule a claim, unless we ask first; a claim that is due earlier stays due."""
         if self._requesting:
             return
         time_ns = max(time_ns, self._again_ns)
         self._due_ns = time_ns if self._due_ns is None else min(time_ns, self._due_ns)
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """Yield the frames due now: claims, and refusals of requests for groups we do not have."""
+        """Yield the frames due now: claims, a guest's request for the address, and refusals."""
         if self._due_ns is not None and now_ns >= self._due_ns:
             lost = self.state is ClaimState.LOST
             if self._request_first and not lost:
@@ -201,7 +201,7 @@ class Node:
     Args:
         bus: name of the bus.
         config: address and NAME.
-        cyclic: groups (PGN) that we send cyclically, so that no one has to request them.
+        cyclic: groups (PGN) that we send anyway; no request for one of them is refused.
         guest: whether the address may belong to another node; then no fault is sent.
 
     Attributes:
@@ -223,7 +223,10 @@ class Node:
         return self._claim.state
 
     def gate(self, neutral: bool, _now_ns: int) -> Reason | None:
-        """Return why no axis may move: silence is no shaped stop, and no axis goes on after it."""
+        """Return why no axis may move while our address is not claimed, or None.
+
+        Without an address we are silent, and silence is no shaped stop: an axis in motion trips.
+        """
         if self._claim.state is ClaimState.LOST:
             return Reason.ADDRESS_LOST
         if self._claim.state is ClaimState.WAITING:
@@ -250,14 +253,14 @@ class Node:
             self.faults.interrupt()
 
     def send_failed(self, *, claim: bool) -> None:
-        """Claim again, because a frame did not reach the bus; ``claim``: it was our claim."""
+        """Claim again, because a frame of ours (``claim``: our claim) did not reach the bus."""
         if claim:
             self._claim.not_sent()
         else:
             self._claim.repeat()
 
     def copy_state(self, before: Self) -> None:
-        """Continue with the same address and NAME."""
+        """Continue the claim of the same address and NAME; ``faults`` are copied apart."""
         self._claim.copy_state(before._claim)
 
     def on_bus_off(self) -> None:

@@ -51,7 +51,7 @@ class Fault(NamedTuple):
 
 
 def dm1_data(faults: Sequence[Fault]) -> bytes:
-    """Return the content of DM1: two bytes of lamps, and four bytes for each fault."""
+    """Return the content of DM1: two bytes of lamps, four for each fault; four zeros for none."""
     lamps = bytes((AMBER_LAMP if faults else 0, NO_LAMP_FLASHES))
     codes = (
         (f.spn & 0xFFFF).to_bytes(2, "little")
@@ -62,7 +62,7 @@ def dm1_data(faults: Sequence[Fault]) -> bytes:
 
 
 class ActiveFaults:
-    """Sends DM1 every second and when it changes."""
+    """Sends DM1 every second, on request, and on a change, one in ``LEAST_BETWEEN_NS`` at most."""
 
     def __init__(self, bus: str, address: int) -> None:
         self._bus = bus
@@ -89,7 +89,7 @@ class ActiveFaults:
 
         Args:
             active: (SPN, FMI) of every present fault.
-            now_ns: monotonic time.
+            now_ns: time of the tick.
             requested: whether another node has requested DM1.
         """
         now = set(active)

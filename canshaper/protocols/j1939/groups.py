@@ -11,7 +11,7 @@ from canshaper.protocols.interface import DrivenAxis
 
 @dataclass(frozen=True, slots=True)
 class SourceEvent:
-    """A message came from a new address, ``source``, while we use those from ``received``."""
+    """A message came from a new address, ``source``; we use ``received``, which may be the same."""
 
     bus: str
     message: str
@@ -36,7 +36,7 @@ class AnySource:
         bus: name of the bus.
         message: name of the message.
         received: the input.
-        timeout_ns: age limit of the input, nanoseconds.
+        timeout_ns: age limit of the input; an address silent for longer is replaced.
         controls: axes that the input moves. Another address is another joystick: when it takes
             over, the axes need neutral first.
 
@@ -111,7 +111,7 @@ class ReceivedGroup:
         self.rest: AnySource | None = None
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Receive a frame; one from an address without an input is ignored."""
+        """Receive a frame; one from our address is a fault, one without an input is ignored."""
         source = frame.can_id & 0xFF
         if source == self._own:
             return FrameFault.SECOND_SENDER

@@ -23,7 +23,7 @@ from canshaper.protocols.j1939.groups import (
 
 @dataclass(frozen=True, slots=True)
 class AddressEvent:
-    """The state of our address on a bus changed, to claimed or lost."""
+    """The state of our address on a bus changed to ``state``."""
 
     bus: str
     address: int
@@ -40,8 +40,9 @@ class J1939Network(BusProtocol):
 
     Args:
         deployment: the machine.
-        axes: axes of the machine; our node on the bus of its valve becomes an interlock of each.
-        inputs: inputs of the machine, each as bound and as received.
+        axes: axes of the machine; our node on the bus of its valve becomes an interlock of each,
+            unless it only listens or its frames are a joystick's that we forward.
+        inputs: (bound message, receiver of its frames) of each input of the machine.
 
     Attributes:
         nodes: our node on each bus of J1939, by bus.
@@ -104,7 +105,7 @@ class J1939Network(BusProtocol):
         return self._groups.get((frame.bus, group_of(frame.can_id)))
 
     def usual(self, frame: Frame) -> bool:
-        """Return whether the frame may be of a J1939 group that no DBC file lists."""
+        """Return whether the frame has 29 bits on a J1939 bus, where unknown groups are normal."""
         return frame.extended and frame.bus in self._buses
 
     @property
@@ -163,7 +164,7 @@ class J1939Network(BusProtocol):
             yield ("faults", *key, config.first_spn, *self._axes, *axes), node.faults
 
     def _active_faults(self, bus: str) -> list[tuple[int, int]]:
-        """Return (SPN, FMI) of axes that cannot move as demanded and valves that do not follow."""
+        """Return (SPN, FMI) of a bus's axes that cannot move as demanded, valves not following."""
         first, active = self._configs[bus].first_spn, []
         for i, control in enumerate(self._axes.values()):
             if control.bound.config.valve.bus != bus:
@@ -177,5 +178,5 @@ class J1939Network(BusProtocol):
 
 
 def _cyclic(deployment: Deployment, bus: str) -> Iterator[int]:
-    """Return the PGNs that we send cyclically under our address."""
+    """Yield the PGNs of all that we send under our address, of which we refuse no request."""
     return (pgn_of(can_id) for can_id, extended in deployment.routing.buses[bus].sent if extended)
