@@ -253,8 +253,7 @@ class NativeController:
         ]
 
     def stalled(self) -> None:
-        """Note that the loop stood still: no input is trusted until it comes again."""
-        self._c.cs_stalled(self._state, self._tables)
+        """Do nothing: ``cs_tick`` finds by itself that the loop stood still."""
 
     def send_failed(self, frame: Frame) -> None:
         """Note that a valve frame could not be sent."""

@@ -21,6 +21,7 @@ from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
 from canshaper.controller.couplings import MotionControl
 from canshaper.errors import ConfigError
+from canshaper.gate.cycle import longest_gap_ns
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.protocols.interface import MessageKey
@@ -79,6 +80,7 @@ def tables(deployment: Deployment) -> Numbers:
     last = {control.valve.key: control for control in axes.values()}
     return {
         "tick_ns": deployment.config.tick_ms * 1_000_000,
+        "longest_gap_ns": longest_gap_ns(deployment),
         "joystick": [_joystick(deployment, name, buses) for name in joysticks],
         "valve": [_valve(control, buses) for control in last.values()],
         "axis": [
