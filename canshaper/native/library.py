@@ -40,15 +40,18 @@ _TABLES = """\
 #include "canshaper.h"
 
 #define R(x) ((cs_real)(x))
+#if WRONG
+#error cs_sizes.h is not of this machine
+#endif
 
 const cs_config cs_tables = {};
 """
 
 
-def sizes_source(tables: Numbers) -> str:
-    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
+def _sizes(tables: Numbers) -> dict[str, int]:
+    """Return the sizes of the arrays in the state."""
     axes = tables["axis"]
-    sizes = {
+    return {
         "CS_JOYSTICKS": len(tables["joystick"]),
         "CS_NUMBERS": max(len(one["number"]) for one in tables["joystick"]),
         "CS_VALVES": len(tables["valve"]),
@@ -57,15 +60,20 @@ def sizes_source(tables: Numbers) -> str:
         "CS_TAPS": max(1, *(one.get("taps_n", 0) for one in axes)),
         "CS_WINDOW": max(one["tail"] for one in axes) + 1,
     }
-    rows = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
+
+
+def sizes_source(tables: Numbers) -> str:
+    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
+    rows = "".join(f"#define {name} {size}\n" for name, size in _sizes(tables).items())
     return f"/* Sizes of what changes, as cs_tables.c needs them. */\n{rows}"
 
 
 def tables_source(tables: Numbers) -> str:
-    """Return ``cs_tables.c``: the constant ``cs_tables``."""
+    """Return ``cs_tables.c``: the constant ``cs_tables``; it refuses sizes of another machine."""
+    wrong = " || ".join(f"({name} != {size})" for name, size in _sizes(tables).items())
     plural = {"joystick": "joysticks", "valve": "valves", "axis": "axes", "motion": "motions"}
     counts = {f"{many}_n": len(tables[one]) for one, many in plural.items()}
-    return _TABLES.replace("{}", _value(tables | counts))
+    return _TABLES.replace("WRONG", wrong).replace("{}", _value(tables | counts))
 
 
 def _value(one: Any, key: str = "") -> str:

@@ -76,8 +76,7 @@ def tables(deployment: Deployment) -> Numbers:
     if problems := [deployment.source.problem(*one) for one in _refused(deployment, controller)]:
         raise ConfigError(problems)
     buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
-    axes = controller.axes
-    last = {control.valve.key: control for control in axes.values()}
+    last = {control.valve.key: control for control in controller.axes.values()}
     return {
         "tick_ns": deployment.config.tick_ms * 1_000_000,
         "longest_gap_ns": longest_gap_ns(deployment),
@@ -91,10 +90,10 @@ def tables(deployment: Deployment) -> Numbers:
                 **_filter(control.axis),
                 **_limits(control.axis),
             }
-            for control in axes.values()
+            for control in controller.axes.values()
         ],
         "motion": [
-            _motion(deployment, name, one, list(axes), buses)
+            _motion(deployment, name, one, list(controller.axes), buses)
             for name, one in zip(deployment.motions, controller.motions, strict=True)
         ],
     }
@@ -231,9 +230,12 @@ def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) 
 
 def _filter(axis: ShapedAxis) -> Numbers:
     """Return sway model and filter of an axis."""
-    transfer, sway = axis.transfer, axis.sway
-    shaper = transfer.shaper
-    numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis.tick_s, "fade": transfer.fade}
+    sway, shaper = axis.sway, axis.transfer.shaper
+    numbers: Numbers = {
+        "kind": KINDS[type(shaper)],
+        "tick_s": axis.tick_s,
+        "fade": axis.transfer.fade,
+    }
     if sway is not None:
         numbers |= {"sways": True, **{n: getattr(sway, n) for n in ("f11", "f12", "f21", "f22")}}
     fir, gff = (shaper.shaper, shaper.gff) if isinstance(shaper, LimitAware) else (shaper, shaper)

@@ -21,6 +21,7 @@ void cs_init(cs_controller *s, const cs_config *c)
         s->motion[i].measured_ns = CS_NEVER;
     }
     s->last = -1;
+    s->able = cs_arithmetic();
 }
 
 /* A frame with the id of a valve came from someone else: its axes trip. */
@@ -86,24 +87,26 @@ static void stalled(cs_controller *s, const cs_config *c)
 
 static int64_t earlier(int64_t a_ns, int64_t b_ns) { return (b_ns < a_ns) ? b_ns : a_ns; }
 
-static void date(cs_message *m, int64_t latest_ns)
+static void date(cs_message *m, int64_t now_ns, bool stood)
 {
-    m->last_frame_ns = earlier(m->last_frame_ns, latest_ns);
-    m->received_ns = earlier(m->received_ns, latest_ns);
+    m->received_ns = stood ? CS_NEVER : earlier(m->received_ns, now_ns);
+    m->refused_ns = earlier(m->refused_ns, now_ns);
+    if (stood) { m->last_frame_ns = CS_NEVER; } /* the age between two frames is by their own times */
 }
 
 /* A frame that came after now counts as one of now: it ages from here. After a standstill none counts any more. */
 static void date_all(cs_controller *s, const cs_config *c, int64_t now_ns, bool stood)
 {
-    int64_t latest_ns = stood ? CS_NEVER : now_ns;
+    for (int32_t i = 0; i < c->axes_n; i++) { s->axis[i].foreign_ns = earlier(s->axis[i].foreign_ns, now_ns); }
     for (int32_t i = 0; i < c->joysticks_n; i++) {
         cs_joystick *j = &s->joystick[i];
-        date(&j->message, latest_ns);
+        date(&j->message, now_ns, stood);
         for (int32_t k = 0; k < c->joystick[i].numbers_n; k++) { j->changed_ns[k] = earlier(j->changed_ns[k], now_ns); }
     }
     for (int32_t i = 0; i < c->motions_n; i++) {
-        date(&s->motion[i].message, latest_ns);
-        s->motion[i].measured_ns = earlier(s->motion[i].measured_ns, latest_ns);
+        cs_motion *m = &s->motion[i];
+        date(&m->message, now_ns, stood);
+        m->measured_ns = stood ? CS_NEVER : earlier(m->measured_ns, now_ns);
     }
 }
 
@@ -130,7 +133,7 @@ static cs_input input_of(cs_controller *s, const cs_config *c, int32_t axis, int
         else if (a->trip == CS_NONE) { a->trip = CS_SECOND_SENDER; }
         else { /* an earlier cause */ }
     }
-    in.trip = a->trip;
+    in.trip = s->able ? a->trip : CS_OUTPUT_INVALID;
     a->trip = CS_NONE;
     if (a->invalid) {
         a->invalid = false;

@@ -159,7 +159,7 @@ typedef struct {
 } cs_motion;
 typedef struct {
     cs_joystick joystick[CS_JOYSTICKS]; cs_valve valve[CS_VALVES]; cs_axis axis[CS_AXES]; cs_motion motion[CS_MOTIONS];
-    int64_t last, now_ns; int32_t late; bool overrun;
+    int64_t last, now_ns; int32_t late; bool overrun, able; /* able: begun, by a build that computes right */
 } cs_controller;
 
 /* ---- functions */
@@ -177,7 +177,7 @@ int32_t cs_tick(cs_controller *s, const cs_config *c, int64_t now_ns, int32_t mi
 /* A frame of a valve did not leave: its axes trip, if they move. */
 void cs_send_failed(cs_controller *s, const cs_config *c, int32_t valve);
 
-/* Whether this build computes as the tables were made for; otherwise it must not be used. */
+/* Whether this build computes as the tables were made for; otherwise, and without cs_init, every axis stays tripped. */
 bool cs_arithmetic(void);
 
 #endif
