@@ -10,7 +10,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.drive import NAMES, valve_keys
 from canshaper.native.tables import Numbers, tables
+from canshaper.shaping.state_machine import TABLE
 from canshaper.shipped import PACKAGE
 
 # Members that point to an array, and the type of its elements.
@@ -45,6 +46,9 @@ _TABLES = """\
 #endif
 
 const cs_config cs_tables = {};
+const cs_row cs_rows[] = {
+    ROWS};
+const int32_t cs_rows_n = COUNT;
 """
 
 
@@ -73,7 +77,19 @@ def tables_source(tables: Numbers) -> str:
     wrong = " || ".join(f"({name} != {size})" for name, size in _sizes(tables).items())
     plural = {"joystick": "joysticks", "valve": "valves", "axis": "axes", "motion": "motions"}
     counts = {f"{many}_n": len(tables[one]) for one, many in plural.items()}
-    return _TABLES.replace("WRONG", wrong).replace("{}", _value(tables | counts))
+    source = _TABLES.replace("WRONG", wrong).replace("{}", _value(tables | counts))
+    rows = [*_rows()]
+    return source.replace("ROWS", ",\n    ".join(rows)).replace("COUNT", str(len(rows)))
+
+
+def _rows() -> Iterator[str]:
+    """Yield the rows of the state machine, which is the same in every machine."""
+    for old, rows in TABLE.items():
+        for when, new, why in rows:
+            named, accepted = ("NONE", why) if isinstance(why, frozenset) else (why.name, ())
+            causes = sum(1 << cause for cause in accepted)
+            words = ", ".join(f"0x{causes >> at & 0xFFFFFFFF:08X}u" for at in (0, 32, 64))
+            yield f"{{CS_{old.name}, 0x{when:03X}u, CS_{new.name}, CS_{named}, {{{words}}}}}"
 
 
 def _value(one: Any, key: str = "") -> str:

@@ -165,12 +165,11 @@ def _key(key: MessageKey, length: int, buses: list[str]) -> Numbers:
 def _message(bound: BoundInput, buses: list[str]) -> Numbers:
     """Return the members of ``cs_message_config``."""
     config, protection = bound.config, bound.protection
-    sequence = SequenceChecker(protection, config.alive_max_step, config.qualify)
     return {
         **_key(bound.key, bound.message.length, buses),
         "counter": _field(bound.message, protection.counter),
         "counts": protection.counts,
-        "max_step": sequence.max_step,
+        "max_step": SequenceChecker(protection, config.alive_max_step, config.qualify).max_step,
         "qualify": config.qualify,
         "timeout_ns": config.timeout_ms * 1_000_000,
     }
@@ -230,12 +229,9 @@ def _wiring(control: AxisControl, deployment: Deployment, joysticks: list[str]) 
 
 def _filter(axis: ShapedAxis) -> Numbers:
     """Return sway model and filter of an axis."""
-    sway, shaper = axis.sway, axis.transfer.shaper
-    numbers: Numbers = {
-        "kind": KINDS[type(shaper)],
-        "tick_s": axis.tick_s,
-        "fade": axis.transfer.fade,
-    }
+    transfer, sway = axis.transfer, axis.sway
+    shaper = transfer.shaper
+    numbers: Numbers = {"kind": KINDS[type(shaper)], "tick_s": axis.tick_s, "fade": transfer.fade}
     if sway is not None:
         numbers |= {"sways": True, **{n: getattr(sway, n) for n in ("f11", "f12", "f21", "f22")}}
     fir, gff = (shaper.shaper, shaper.gff) if isinstance(shaper, LimitAware) else (shaper, shaper)

@@ -52,7 +52,7 @@ enum {
     CS_BYPASS_RELEASED = 5, CS_STOP_DONE = 6, CS_RESET = 7, CS_COMPENSATING = 8, CS_JOYSTICK_NOT_NEUTRAL = 16,
     CS_ENABLE_OFF = 17, CS_JOYSTICK_TIMEOUT = 32, CS_JOYSTICK_OUT_OF_RANGE = 35, CS_SWITCH_INVALID = 37,
     CS_JOYSTICK_FROZEN = 39, CS_JOYSTICK_UNTRUSTED = 40, CS_LOOP_OVERRUN = 41, CS_ENABLE_LOST = 64,
-    CS_OUTPUT_INVALID = 65, CS_SEND_FAILED = 66, CS_LOOP_STALLED = 67, CS_EMERGENCY_STOP_LOST = 69, CS_SECOND_SENDER = 70
+    CS_OUTPUT_INVALID = 65, CS_SEND_FAILED = 66, CS_LOOP_STALLED = 67, CS_SECOND_SENDER = 70
 };
 /* Filters. CS_FIR: ZV, ZVD, EI, two-mode. CS_ROBUST: a FIR with feedback of what limits made. */
 enum { CS_OFF, CS_FIR, CS_ROBUST, CS_GFF, CS_FIRST_ORDER, CS_S_CURVE };
@@ -116,6 +116,12 @@ typedef struct {
     const cs_valve_config *valve; const cs_axis_config *axis; const cs_motion_config *motion;
 } cs_config;
 extern const cs_config cs_tables;
+
+/* A row of the state machine. when: conditions of cs_states.c. why: the reason; CS_NONE: the cause that the input names,
+   if its bit is in causes; any other one is a mistake, and trips. */
+typedef struct { int32_t state; uint32_t when; int32_t new_state, why; uint32_t causes[3]; } cs_row;
+extern const cs_row cs_rows[];
+extern const int32_t cs_rows_n;
 
 /* ---- what changes */
 
