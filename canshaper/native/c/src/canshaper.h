@@ -112,8 +112,9 @@ typedef struct {
 } cs_motion_config;
 
 typedef struct {
-    int64_t tick_ns, longest_gap_ns; int32_t joysticks_n, valves_n, axes_n, motions_n; const cs_joystick_config *joystick;
-    const cs_valve_config *valve; const cs_axis_config *axis; const cs_motion_config *motion;
+    int64_t tick_ns, longest_gap_ns; int32_t joysticks_n, valves_n, axes_n, motions_n;
+    const cs_joystick_config *joystick; const cs_valve_config *valve; const cs_axis_config *axis;
+    const cs_motion_config *motion;
 } cs_config;
 extern const cs_config cs_tables;
 
