@@ -14,6 +14,7 @@ from canshaper.codec.velocity import VelocitySignal
 from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
 from canshaper.controller.couplings import MotionControl
+from canshaper.gate.cycle import Standstill
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.machine.joysticks import BoundJoystick
@@ -34,7 +35,7 @@ class Tick:
         now_ns: time of the tick.
         missed: number of ticks that were left out before it.
         frames: received frames in order, each ``READ_NS`` before the tick.
-        stalled: the loop stood still before the tick.
+        stalled: the loop stood still before the tick, as the daemon finds it.
         failed: valve frame of the tick before that could not be sent, or None.
     """
 
@@ -77,10 +78,10 @@ class Driven(Protocol):
 
 def play(tick: Tick, controller: Driven) -> list[Frame]:
     """Give a tick of a drive to a controller; return the frames that it sends."""
-    if tick.stalled:
-        controller.stalled()
     if tick.failed is not None:
         controller.send_failed(tick.failed)
+    if tick.stalled:
+        controller.stalled()
     for frame in tick.frames:
         controller.receive(frame, tick.now_ns - READ_NS)
     return list(controller.tick(tick.now_ns, tick.missed))
@@ -109,12 +110,16 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
     middles = {
         one.key: 0.5 * ((one.signal.minimum or 0) + (one.signal.maximum or 0)) for one in radii
     }
-    valves = valve_keys(deployment)
-    now_ns, late = BEGIN_NS, 0
+    valves, standstill = valve_keys(deployment), Standstill(deployment)
+    most = standstill.limit_ns // tick_ns  # ticks from one to the next that are no standstill
+    now_ns, late, stands = BEGIN_NS, 0, False
     for _ in range(ticks):
         late = 60 if source.random() < 0.001 else max(late - 1, 0)
         missed = source.choice((0, 0, 1, 2) if late else (0,) * 300 + (1, 2, 5))
+        if stands:
+            missed = source.choice((most - 1, most, 500))
         now_ns += tick_ns * (1 + missed)
+        stalled, standstill.last_ns = standstill.over(now_ns), now_ns
         frames = []
         for name, bound in deployment.joysticks.items():
             frames += _joystick_frames(source, bound, hands[name])
@@ -128,7 +133,8 @@ def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick
         frames += _strange_frames(source, deployment)
         source.shuffle(frames)
         failed = Frame(*source.choice(valves), b"") if source.random() < 0.0003 else None
-        yield Tick(now_ns, missed, frames, source.random() < 0.0002, failed)
+        stands = source.random() < 0.0002
+        yield Tick(now_ns, missed, frames, stalled, failed)
 
 
 def _joystick_frames(source: random.Random, bound: BoundJoystick, hand: _Hand) -> list[Frame]:

@@ -94,8 +94,7 @@ def golden_source(deployment: Deployment, golden: Golden, *, single: bool) -> st
 
     def tick(one: Tick, sent: list[Frame]) -> str:
         failed = -1 if one.failed is None else valves.index(one.failed[:3])
-        counts = f"{one.missed}, {len(one.frames)}, {len(sent)}, {failed}"
-        return f"{{{one.now_ns}, {counts}, {str(one.stalled).lower()}}}"
+        return f"{{{one.now_ns}, {one.missed}, {len(one.frames)}, {len(sent)}, {failed}}}"
 
     probes = []
     for k in range(PROBES if deployment.motions and not single else 0):

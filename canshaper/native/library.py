@@ -10,7 +10,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from canshaper.errors import NativeError
 from canshaper.machine.deployment import Deployment
 from canshaper.native.drive import NAMES, valve_keys
 from canshaper.native.tables import Numbers, tables
+from canshaper.shaping.state_machine import TABLE
 from canshaper.shipped import PACKAGE
 
 # Members that point to an array, and the type of its elements.
@@ -40,15 +41,21 @@ _TABLES = """\
 #include "canshaper.h"
 
 #define R(x) ((cs_real)(x))
+#if WRONG
+#error cs_sizes.h is not of this machine
+#endif
 
 const cs_config cs_tables = {};
+const cs_row cs_rows[] = {
+    ROWS};
+const int32_t cs_rows_n = COUNT;
 """
 
 
-def sizes_source(tables: Numbers) -> str:
-    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
+def _sizes(tables: Numbers) -> dict[str, int]:
+    """Return the sizes of the arrays in the state."""
     axes = tables["axis"]
-    sizes = {
+    return {
         "CS_JOYSTICKS": len(tables["joystick"]),
         "CS_NUMBERS": max(len(one["number"]) for one in tables["joystick"]),
         "CS_VALVES": len(tables["valve"]),
@@ -57,15 +64,32 @@ def sizes_source(tables: Numbers) -> str:
         "CS_TAPS": max(1, *(one.get("taps_n", 0) for one in axes)),
         "CS_WINDOW": max(one["tail"] for one in axes) + 1,
     }
-    rows = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
+
+
+def sizes_source(tables: Numbers) -> str:
+    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
+    rows = "".join(f"#define {name} {size}\n" for name, size in _sizes(tables).items())
     return f"/* Sizes of what changes, as cs_tables.c needs them. */\n{rows}"
 
 
 def tables_source(tables: Numbers) -> str:
-    """Return ``cs_tables.c``: the constant ``cs_tables``."""
+    """Return ``cs_tables.c``: the constant ``cs_tables``; it refuses sizes of another machine."""
+    wrong = " || ".join(f"({name} != {size})" for name, size in _sizes(tables).items())
     plural = {"joystick": "joysticks", "valve": "valves", "axis": "axes", "motion": "motions"}
     counts = {f"{many}_n": len(tables[one]) for one, many in plural.items()}
-    return _TABLES.replace("{}", _value(tables | counts))
+    source = _TABLES.replace("WRONG", wrong).replace("{}", _value(tables | counts))
+    rows = [*_rows()]
+    return source.replace("ROWS", ",\n    ".join(rows)).replace("COUNT", str(len(rows)))
+
+
+def _rows() -> Iterator[str]:
+    """Yield the rows of the state machine, which is the same in every machine."""
+    for old, rows in TABLE.items():
+        for when, new, why in rows:
+            named, accepted = ("NONE", why) if isinstance(why, frozenset) else (why.name, ())
+            causes = sum(1 << cause for cause in accepted)
+            words = ", ".join(f"0x{causes >> at & 0xFFFFFFFF:08X}u" for at in (0, 32, 64))
+            yield f"{{CS_{old.name}, 0x{when:03X}u, CS_{new.name}, CS_{named}, {{{words}}}}}"
 
 
 def _value(one: Any, key: str = "") -> str:
@@ -253,8 +277,7 @@ class NativeController:
         ]
 
     def stalled(self) -> None:
-        """Note that the loop stood still: no input is trusted until it comes again."""
-        self._c.cs_stalled(self._state, self._tables)
+        """Do nothing: ``cs_tick`` finds by itself that the loop stood still."""
 
     def send_failed(self, frame: Frame) -> None:
         """Note that a valve frame could not be sent."""

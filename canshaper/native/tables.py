@@ -22,6 +22,7 @@ from canshaper.controller.axis_control import AxisControl
 from canshaper.controller.controller import Controller
 from canshaper.controller.couplings import MotionControl
 from canshaper.errors import ConfigError
+from canshaper.gate.cycle import longest_gap_ns
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.axis import ShapedAxis
@@ -75,10 +76,10 @@ def tables(deployment: Deployment) -> Numbers:
     if problems := [deployment.source.problem(*one) for one in _refused(deployment, controller)]:
         raise ConfigError(problems)
     buses, joysticks = list(deployment.config.buses), list(deployment.joysticks)
-    axes = controller.axes
-    last = {control.valve.key: control for control in axes.values()}
+    last = {control.valve.key: control for control in controller.axes.values()}
     return {
         "tick_ns": deployment.config.tick_ms * 1_000_000,
+        "longest_gap_ns": longest_gap_ns(deployment),
         "joystick": [_joystick(deployment, name, buses) for name in joysticks],
         "valve": [_valve(control, buses) for control in last.values()],
         "axis": [
@@ -89,10 +90,10 @@ def tables(deployment: Deployment) -> Numbers:
                 **_filter(control.axis),
                 **_limits(control.axis),
             }
-            for control in axes.values()
+            for control in controller.axes.values()
         ],
         "motion": [
-            _motion(deployment, name, one, list(axes), buses)
+            _motion(deployment, name, one, list(controller.axes), buses)
             for name, one in zip(deployment.motions, controller.motions, strict=True)
         ],
     }
@@ -164,12 +165,11 @@ def _key(key: MessageKey, length: int, buses: list[str]) -> Numbers:
 def _message(bound: BoundInput, buses: list[str]) -> Numbers:
     """Return the members of ``cs_message_config``."""
     config, protection = bound.config, bound.protection
-    sequence = SequenceChecker(protection, config.alive_max_step, config.qualify)
     return {
         **_key(bound.key, bound.message.length, buses),
         "counter": _field(bound.message, protection.counter),
         "counts": protection.counts,
-        "max_step": sequence.max_step,
+        "max_step": SequenceChecker(protection, config.alive_max_step, config.qualify).max_step,
         "qualify": config.qualify,
         "timeout_ns": config.timeout_ms * 1_000_000,
     }

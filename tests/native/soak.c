@@ -116,10 +116,12 @@ int main(int argc, char **argv)
         cs_real row[64];
         const int32_t missed = one_in(300) ? missed_by[any() % (one_in(100) ? 8u : 5u)] : 0;
         now += cs_tables.tick_ns * ((missed > 0) ? ((missed % 10) + 1) : 1);
-        if (one_in(5000)) { cs_stalled(&crane, &cs_tables); }
+        if (one_in(5000)) { now += cs_tables.tick_ns * ((int64_t)(any() % 200u) - 100); }
+        const int64_t strange[4] = {CS_NEVER, INT64_MAX, 0, -now};
+        const int64_t at = one_in(20000) ? strange[any() % 4u] : now;
         if (one_in(3000)) { cs_send_failed(&crane, &cs_tables, (int32_t)(any() % 8u) - 2); }
         receive_all(&crane, hands, &radius_m, now);
-        const int32_t n = cs_tick(&crane, &cs_tables, now, missed, out);
+        const int32_t n = cs_tick(&crane, &cs_tables, at, missed, out);
         for (int32_t i = 0; i < n; i++) { hash(&frames_hash, out[i].data, CS_BYTES); }
         for (int32_t i = 0; i < cs_tables.axes_n; i++) {
             moved += (crane.axis[i].out.steps != 0) ? 1 : 0;

@@ -84,7 +84,7 @@ MUTANTS = {
         "canshaper.c",
         "s->overrun = (s->overrun || (s->late == LATE_LIMIT)) && (s->late > 0);",
         "s->overrun = s->late == LATE_LIMIT;",
-        "state",
+        "was_reset",
     ),
     "a foreign sender": ("canshaper.c", "FOREIGN_NS 1000000000", "FOREIGN_NS 900000000", "state"),
 }

@@ -21,6 +21,7 @@ void cs_init(cs_controller *s, const cs_config *c)
         s->motion[i].measured_ns = CS_NEVER;
     }
     s->last = -1;
+    s->able = cs_arithmetic();
 }
 
 /* A frame with the id of a valve came from someone else: its axes trip. */
@@ -65,28 +66,47 @@ void cs_send_failed(cs_controller *s, const cs_config *c, int32_t valve)
     }
 }
 
-void cs_stalled(cs_controller *s, const cs_config *c)
+/* Whether the loop stood still for too long since the last tick, or no one knows for how long: the clock stood, went
+   back, or disagrees with missed. Late by a tick or more is missed, so both ends of the gap move by less than one. */
+static bool stood_still(const cs_controller *s, const cs_config *c, int64_t now_ns, uint64_t missed)
 {
-    s->stood_still = true;
+    uint64_t gap_ns = (uint64_t)now_ns - (uint64_t)s->now_ns; /* back is very far ahead */
+    uint64_t tick_ns = (uint64_t)c->tick_ns;
+    bool counted = (gap_ns > (missed * tick_ns)) && (gap_ns < ((missed + 2u) * tick_ns));
+    return (s->last >= 0) && !(counted && (gap_ns <= (uint64_t)c->longest_gap_ns));
+}
+
+/* Trip axes that move; the others lose their input until it comes again. */
+static void stalled(cs_controller *s, const cs_config *c)
+{
     for (int32_t i = 0; i < c->axes_n; i++) {
         s->axis[i].invalid = true;
         trip_in_motion(&s->axis[i], CS_LOOP_STALLED);
     }
 }
 
-/* What has come does not count any more; the frames that waited during a standstill neither. */
-static void invalidate(cs_message *m)
+static int64_t earlier(int64_t a_ns, int64_t b_ns) { return (b_ns < a_ns) ? b_ns : a_ns; }
+
+static void date(cs_message *m, int64_t now_ns, bool stood)
 {
-    m->last_frame_ns = CS_NEVER;
-    m->received_ns = CS_NEVER;
+    m->received_ns = stood ? CS_NEVER : earlier(m->received_ns, now_ns);
+    m->refused_ns = earlier(m->refused_ns, now_ns);
+    if (stood) { m->last_frame_ns = CS_NEVER; } /* the age between two frames is by their own times */
 }
 
-static void invalidate_all(cs_controller *s, const cs_config *c)
+/* A frame that came after now counts as one of now: it ages from here. After a standstill none counts any more. */
+static void date_all(cs_controller *s, const cs_config *c, int64_t now_ns, bool stood)
 {
-    for (int32_t i = 0; i < c->joysticks_n; i++) { invalidate(&s->joystick[i].message); }
+    for (int32_t i = 0; i < c->axes_n; i++) { s->axis[i].foreign_ns = earlier(s->axis[i].foreign_ns, now_ns); }
+    for (int32_t i = 0; i < c->joysticks_n; i++) {
+        cs_joystick *j = &s->joystick[i];
+        date(&j->message, now_ns, stood);
+        for (int32_t k = 0; k < c->joystick[i].numbers_n; k++) { j->changed_ns[k] = earlier(j->changed_ns[k], now_ns); }
+    }
     for (int32_t i = 0; i < c->motions_n; i++) {
-        invalidate(&s->motion[i].message);
-        s->motion[i].measured_ns = CS_NEVER;
+        cs_motion *m = &s->motion[i];
+        date(&m->message, now_ns, stood);
+        m->measured_ns = stood ? CS_NEVER : earlier(m->measured_ns, now_ns);
     }
 }
 
@@ -113,7 +133,7 @@ static cs_input input_of(cs_controller *s, const cs_config *c, int32_t axis, int
         else if (a->trip == CS_NONE) { a->trip = CS_SECOND_SENDER; }
         else { /* an earlier cause */ }
     }
-    in.trip = a->trip;
+    in.trip = s->able ? a->trip : CS_OUTPUT_INVALID;
     a->trip = CS_NONE;
     if (a->invalid) {
         a->invalid = false;
@@ -158,13 +178,14 @@ static bool run(cs_controller *s, const cs_config *c, int32_t axis, int64_t now_
 int32_t cs_tick(cs_controller *s, const cs_config *c, int64_t now_ns, int32_t missed, cs_frame *out)
 {
     int64_t last = s->last;
-    int64_t now = (last + 1) + ((missed > 0) ? missed : 0);
+    int64_t more = (missed > 0) ? missed : 0;
+    int64_t now = last + 1 + more;
     int32_t frames = 0;
+    bool stood = stood_still(s, c, now_ns, (uint64_t)more);
+    if (stood) { stalled(s, c); }
+    date_all(s, c, now_ns, stood);
     s->last = now;
-    if (s->stood_still) {
-        s->stood_still = false;
-        invalidate_all(s, c);
-    }
+    s->now_ns = now_ns;
     bool late = overrun(s, missed > 0);
     for (int32_t i = 0; (i < c->axes_n) && (missed > 0); i++) {
         int32_t period = c->axis[i].period_ticks;

@@ -11,13 +11,14 @@
            for each frame that was received since the last tick:
                cs_receive(&crane, &cs_tables, bus, id, extended, data, length, arrived_ns);
            count = cs_tick(&crane, &cs_tables, now_ns, missed, frames);
-           send frames[0] to frames[count - 1] at once, or never
+           send frames[0] to frames[count - 1] at once, or never: cs_send_failed for each that did not leave
        }
 
    Times are of one monotonic clock, in ns. arrived_ns is when a frame came, not when it was read: one that has waited
-   is old. missed counts the ticks that were left out since the last call; the valves held their output meanwhile. A
-   frame that could not be sent is reported by cs_send_failed, a loop that stood still for longer than the shortest
-   timeout by cs_stalled, before the next cs_tick.
+   is old. missed counts the ticks that were left out since the last call; the valves held their output meanwhile. After
+   a gap longer than cs_tables.longest_gap_ns, frames that waited must not look fresh, and a valve may have closed: then
+   cs_tick takes no input until it comes again, and trips axes that move. It does so too where now_ns stands, goes back,
+   or disagrees with missed by a tick. No function may interrupt another one on the same object.
 
    The bounds of time are constant: no recursion, no heap, and every loop ends after a number of turns that the tables
    give. Floating point has to be that of IEEE 754, rounded to nearest and never contracted (-ffp-contract=off, no
@@ -51,7 +52,7 @@ enum {
     CS_BYPASS_RELEASED = 5, CS_STOP_DONE = 6, CS_RESET = 7, CS_COMPENSATING = 8, CS_JOYSTICK_NOT_NEUTRAL = 16,
     CS_ENABLE_OFF = 17, CS_JOYSTICK_TIMEOUT = 32, CS_JOYSTICK_OUT_OF_RANGE = 35, CS_SWITCH_INVALID = 37,
     CS_JOYSTICK_FROZEN = 39, CS_JOYSTICK_UNTRUSTED = 40, CS_LOOP_OVERRUN = 41, CS_ENABLE_LOST = 64,
-    CS_OUTPUT_INVALID = 65, CS_SEND_FAILED = 66, CS_LOOP_STALLED = 67, CS_EMERGENCY_STOP_LOST = 69, CS_SECOND_SENDER = 70
+    CS_OUTPUT_INVALID = 65, CS_SEND_FAILED = 66, CS_LOOP_STALLED = 67, CS_SECOND_SENDER = 70
 };
 /* Filters. CS_FIR: ZV, ZVD, EI, two-mode. CS_ROBUST: a FIR with feedback of what limits made. */
 enum { CS_OFF, CS_FIR, CS_ROBUST, CS_GFF, CS_FIRST_ORDER, CS_S_CURVE };
@@ -111,10 +112,17 @@ typedef struct {
 } cs_motion_config;
 
 typedef struct {
-    int64_t tick_ns; int32_t joysticks_n, valves_n, axes_n, motions_n; const cs_joystick_config *joystick;
-    const cs_valve_config *valve; const cs_axis_config *axis; const cs_motion_config *motion;
+    int64_t tick_ns, longest_gap_ns; int32_t joysticks_n, valves_n, axes_n, motions_n;
+    const cs_joystick_config *joystick; const cs_valve_config *valve; const cs_axis_config *axis;
+    const cs_motion_config *motion;
 } cs_config;
 extern const cs_config cs_tables;
+
+/* A row of the state machine. when: conditions of cs_states.c. why: the reason; CS_NONE: the cause that the input names,
+   if its bit is in causes; any other one is a mistake, and trips. */
+typedef struct { int32_t state; uint32_t when; int32_t new_state, why; uint32_t causes[3]; } cs_row;
+extern const cs_row cs_rows[];
+extern const int32_t cs_rows_n;
 
 /* ---- what changes */
 
@@ -158,7 +166,7 @@ typedef struct {
 } cs_motion;
 typedef struct {
     cs_joystick joystick[CS_JOYSTICKS]; cs_valve valve[CS_VALVES]; cs_axis axis[CS_AXES]; cs_motion motion[CS_MOTIONS];
-    int64_t last; int32_t late; bool overrun, stood_still;
+    int64_t last, now_ns; int32_t late; bool overrun, able; /* able: begun, by a build that computes right */
 } cs_controller;
 
 /* ---- functions */
@@ -166,7 +174,7 @@ typedef struct {
 /* Begin with every axis in NEUTRAL_WAIT. */
 void cs_init(cs_controller *s, const cs_config *c);
 
-/* Take a frame that was received; one that no table names has no effect. */
+/* Take a data frame of classical CAN that was received; one that no table names has no effect. */
 void cs_receive(cs_controller *s, const cs_config *c, int32_t bus, uint32_t id, bool extended, const uint8_t *data,
                 int32_t length, int64_t arrived_ns);
 
@@ -176,10 +184,7 @@ int32_t cs_tick(cs_controller *s, const cs_config *c, int64_t now_ns, int32_t mi
 /* A frame of a valve did not leave: its axes trip, if they move. */
 void cs_send_failed(cs_controller *s, const cs_config *c, int32_t valve);
 
-/* The loop stood still for longer than an input may age: none counts until it comes again, axes that move trip. */
-void cs_stalled(cs_controller *s, const cs_config *c);
-
-/* Whether this build computes as the tables were made for; otherwise it must not be used. */
+/* Whether this build computes as the tables were made for; otherwise, and without cs_init, every axis stays tripped. */
 bool cs_arithmetic(void);
 
 #endif

@@ -42,8 +42,8 @@ void cs_field_write(const cs_field *f, uint8_t *data, int32_t value)
 
 bool cs_fresh(int64_t since_ns, int64_t now_ns, int64_t timeout_ns)
 {
-    int64_t oldest = (now_ns > timeout_ns) ? (now_ns - timeout_ns) : (CS_NEVER + 1); /* no time overflows */
-    return since_ns >= oldest;
+    uint64_t age_ns = (uint64_t)now_ns - (uint64_t)since_ns; /* no time overflows */
+    return (since_ns != CS_NEVER) && ((since_ns >= now_ns) || (age_ns <= (uint64_t)timeout_ns));
 }
 
 void cs_message_init(cs_message *m) { *m = (cs_message){CS_NEVER, CS_NEVER, CS_NEVER, CS_NONE, 0, true, false}; }

@@ -10,62 +10,16 @@ enum {
     UNSHAPED = 0x080, ADDED = 0x100, NOT_ADDED = 0x200, AT_REST = 0x400, STOP_OVER = 0x800
 };
 
-/* In place of a reason: the cause that the input names, if it is one of these; any other one is a mistake, and trips. */
-enum { ANY = -1, STOPS = -2, STOPS_IN_BYPASS = -3, WAITS = -4, TRIPS = -5, TRIPS_AT_REST = -6 };
-
-typedef struct { int32_t state; uint32_t when; int32_t new_state, why; } row;
-
-static const row table[] = {
-    {CS_NEUTRAL_WAIT, TRIP, CS_TRIPPED, TRIPS_AT_REST},
-    {CS_NEUTRAL_WAIT, DEFLECTED, CS_NEUTRAL_WAIT, CS_JOYSTICK_NOT_NEUTRAL},
-    {CS_NEUTRAL_WAIT, RELEASED, CS_NEUTRAL_WAIT, CS_ENABLE_OFF},
-    {CS_NEUTRAL_WAIT, FAULT, CS_NEUTRAL_WAIT, ANY},
-    {CS_NEUTRAL_WAIT, CENTRED, CS_READY, CS_JOYSTICK_NEUTRAL},
-    {CS_READY, TRIP, CS_TRIPPED, TRIPS_AT_REST},
-    {CS_READY, RELEASED, CS_NEUTRAL_WAIT, CS_ENABLE_OFF},
-    {CS_READY, FAULT, CS_NEUTRAL_WAIT, WAITS},
-    {CS_READY, DEFLECTED | SHAPED, CS_ACTIVE, CS_JOYSTICK_MOVED},
-    {CS_READY, DEFLECTED | UNSHAPED, CS_BYPASS_ON, CS_BYPASS_REQUESTED},
-    {CS_READY, CENTRED | ADDED, CS_ACTIVE, CS_COMPENSATING},
-    {CS_ACTIVE, TRIP, CS_TRIPPED, TRIPS},
-    {CS_ACTIVE, RELEASED, CS_TRIPPED, CS_ENABLE_LOST},
-    {CS_ACTIVE, FAULT, CS_STOPPING, STOPS},
-    {CS_ACTIVE, CENTRED | AT_REST | NOT_ADDED, CS_READY, CS_AT_REST},
-    {CS_ACTIVE, UNSHAPED, CS_BYPASS_ON, CS_BYPASS_REQUESTED},
-    {CS_BYPASS_ON, TRIP, CS_TRIPPED, TRIPS},
-    {CS_BYPASS_ON, RELEASED, CS_TRIPPED, CS_ENABLE_LOST},
-    {CS_BYPASS_ON, FAULT, CS_STOPPING, STOPS_IN_BYPASS},
-    {CS_BYPASS_ON, CENTRED | AT_REST | NOT_ADDED, CS_READY, CS_AT_REST},
-    {CS_BYPASS_ON, SHAPED, CS_ACTIVE, CS_BYPASS_RELEASED},
-    {CS_STOPPING, TRIP, CS_TRIPPED, TRIPS},
-    {CS_STOPPING, RELEASED, CS_TRIPPED, CS_ENABLE_LOST},
-    {CS_STOPPING, AT_REST, CS_NEUTRAL_WAIT, CS_STOP_DONE},
-    {CS_STOPPING, STOP_OVER, CS_NEUTRAL_WAIT, CS_STOP_DONE},
-    {CS_TRIPPED, PRESSED | CENTRED, CS_NEUTRAL_WAIT, CS_RESET},
-};
-#define ROWS ((int32_t)(sizeof(table) / sizeof(table[0])))
-
-/* Whether a row accepts a cause: the number of a reason is its reaction. */
-static bool accepted(int32_t why, int32_t cause)
+/* Whether a row accepts a cause. */
+static bool accepted(const cs_row *r, int32_t cause)
 {
-    bool stops = (cause >= CS_JOYSTICK_TIMEOUT) && (cause < CS_ENABLE_LOST);
-    bool trips = cause >= CS_ENABLE_LOST;
-    bool yes = true;
-    switch (why) {
-    case STOPS: yes = stops; break;
-    case STOPS_IN_BYPASS: yes = stops && (cause != CS_LOOP_OVERRUN); break; /* late ticks spoil a filter only */
-    case WAITS: yes = stops || (cause == CS_ENABLE_OFF) || (cause == CS_EMERGENCY_STOP_LOST); break;
-    case TRIPS: yes = trips; break;
-    case TRIPS_AT_REST: yes = trips && (cause != CS_ENABLE_LOST); break; /* enable is lost in motion only */
-    default: break; /* ANY */
-    }
-    return yes;
+    return ((r->causes[cause / 32] >> ((uint32_t)cause % 32u)) & 1u) != 0u;
 }
 
-static void take(cs_axis *a, const row *r, int32_t cause)
+static void take(cs_axis *a, const cs_row *r, int32_t cause)
 {
-    bool named = r->why >= 0;
-    a->state = (named || accepted(r->why, cause)) ? r->new_state : CS_TRIPPED;
+    bool named = r->why != CS_NONE;
+    a->state = (named || accepted(r, cause)) ? r->new_state : CS_TRIPPED;
     a->reason = named ? r->why : cause;
     if (a->state == CS_STOPPING) { a->stopping = 0; }
 }
@@ -98,9 +52,10 @@ void cs_states_step(cs_axis *a, const cs_axis_config *c, const cs_input *in, boo
         a->stopping = cs_later(a->stopping, 1);
         if (a->stopping >= c->stop_ticks) { holding |= STOP_OVER; }
     }
-    const row *found = NULL;
-    for (int32_t i = 0; (i < ROWS) && (found == NULL); i++) {
-        if ((table[i].state == a->state) && ((table[i].when & holding) == table[i].when)) { found = &table[i]; }
+    const cs_row *found = NULL;
+    for (int32_t i = 0; (i < cs_rows_n) && (found == NULL); i++) {
+        const cs_row *r = &cs_rows[i];
+        if ((r->state == a->state) && ((r->when & holding) == r->when)) { found = r; }
     }
     if (found != NULL) { take(a, found, (in->trip == CS_NONE) ? in->fault : in->trip); }
 }

@@ -10,7 +10,7 @@ int32_t cs_inspect_axis(const cs_controller *s, int32_t axis, cs_real *out);
 int32_t cs_inspect_motion(const cs_controller *s, int32_t motion, cs_real *out);
 
 /* A tick: how many frames came before it and leave with it; failed: a valve whose frame did not leave, or CS_NONE. */
-typedef struct { int64_t now_ns; int32_t missed, in_n, out_n, failed; bool stalled; } cs_golden_tick;
+typedef struct { int64_t now_ns; int32_t missed, in_n, out_n, failed; } cs_golden_tick;
 
 extern const cs_golden_tick cs_golden_ticks[];
 extern const cs_frame cs_golden_in[], cs_golden_out[];
