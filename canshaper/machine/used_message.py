@@ -187,8 +187,8 @@ class UsedMessage:
             return
         fault = next((f for raw in means if (f := code_fault(signal, raw))), None)
         if is_j1939(self.message) and (first := j1939_code(signal)) is not None:
-            raw, choices = max(means), signal.choices or {}
-            if raw >= first and raw not in choices:
+            raw = max(means)
+            if raw >= first and raw not in (signal.choices or {}):
                 text = f"{signal.name}: expected a code below {first}, as the others are errors in"
                 fault = fault or f"{text} J1939, or a name for it (VAL_), got {raw}"
         if wrong and not fault:
