@@ -21,7 +21,11 @@ WIDTH, ROW, LEFT = 960, 46, 24
 # Rings by what an error can do: who reviews a change, and rooms below canshaper/. A room within
 # another one belongs to the ring that names it.
 RINGS = {
-    "gate": ("someone who did not write it, every line, against safety.md", ("gate",)),
+    # Those beside the gate decide too which frame leaves: past it none would be checked.
+    "gate": (
+        "someone who did not write it, every line, against safety.md",
+        ("gate", "controller/gated", "blackbox/recorder"),
+    ),
     "runtime": (
         "a maintainer; golden drives equal to the bit",
         (

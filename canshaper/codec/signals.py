@@ -214,6 +214,42 @@ def code_fault(signal: Signal, raw: int) -> str | None:
     return f"{signal.name} can never be {raw}: expected a signal that has it, got {got}"
 
 
+def j1939_code(signal: Signal) -> int | None:
+    """Return the first raw value that J1939-71 gives to an error, or None where it gives none.
+
+    An error or "not available" is FE or FF in the highest byte of whole bytes, else one of the two
+    last codes. Floats, signed signals and single bits have no such codes.
+    """
+    if signal.is_float or signal.is_signed or signal.length < 2:
+        return None
+    whole = signal.length % 8 == 0
+    return 0xFE << signal.length - 8 if whole else (1 << signal.length) - 2
+
+
+def j1939_fault(signal: Signal) -> str | None:
+    """Return why an error code of J1939-71 would be read as a measurement, or None.
+
+    It is none where the code lies out of the range, or where the DBC names it.
+    """
+    if (first := j1939_code(signal)) is None:
+        return None
+    names: Mapping[int, object] = signal.choices or {}
+    last, few = raw_limits(signal)[1], len(names)
+    # A range has one end beyond these codes, and each name takes one of them.
+    ends = (*range(first, min(first + few, last) + 1), *range(last, max(last - few, first) - 1, -1))
+    raws = (r for r in ends if r not in names)
+    raw = next((r for r in raws if in_range(signal, r * signal.scale + signal.offset)), None)
+    if raw is None:
+        return None
+    low, high = signal.minimum, signal.maximum
+    got = "no range" if low is None or high is None or high <= low else f"[{low:g}|{high:g}]"
+    value = f"{raw * signal.scale + signal.offset:g} {signal.unit or ''}".rstrip()
+    return (
+        f"{signal.name}: expected a range that ends before the error codes of J1939, {first} to"
+        f" {last}, or names for them (VAL_), got {got}: {raw} would be {value}"
+    )
+
+
 def raw_fault(signal: Signal) -> str | None:
     """Return the fault of a switch that the DBC scales, as its raw value counts; else None."""
     if (signal.scale, signal.offset) == (1, 0):

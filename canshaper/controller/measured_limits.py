@@ -89,7 +89,8 @@ class RopeLength:
         self.length_m = highest_m
         self.state = "known"
         self._measured: float | None = None  # last measured length
-        self._since_s = 0.0  # time since it changed
+        self._since_s = 0.0  # time since it changed, without that while it was lost
+        self._lost_s = 0.0  # time for which it has been lost
         self._settles_s = 0.0
 
     @property
@@ -119,17 +120,21 @@ class RopeLength:
         return state != before
 
     def _state(self, measured_m: float | None, elapsed_s: float) -> str:
-        self._since_s += elapsed_s
         if measured_m is None or not measured_m > 0.0:
-            self._measured = None
+            self._lost_s += elapsed_s
             return "lost"
+        self._since_s += elapsed_s
         last, self._measured = self._measured, measured_m
         self._settles_s = max(self._settles_s - elapsed_s, 0.0)
         if last is not None and measured_m != last:
-            way = MOST_M_S * min(self._since_s, MOST_SILENT_S) + ROUNDING_M
+            # The rope may run all the time that its length is lost: the length before says less
+            # and less, and nothing once this way is longer than the rope.
+            elapsed_s = min(self._since_s, MOST_SILENT_S) + self._lost_s
+            way = MOST_M_S * elapsed_s + ROUNDING_M
             self._since_s = 0.0
             if abs(measured_m - last) > way:
                 self._settles_s = SETTLES_S
+        self._lost_s = 0.0
         return "jumped" if self._settles_s else "known"
 
 

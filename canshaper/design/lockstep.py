@@ -106,7 +106,7 @@ class LockStep:
 
     Args:
         deployment: the machine.
-        processor: the controller, or a wrapper around it.
+        processor: the controller behind its gate, or a drive around that.
         plant: the crane.
         joysticks: the sources of joystick frames.
         on_frame: called with every frame and its time in s; None if nobody listens.

@@ -260,7 +260,7 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
             ours |= bits
             continue
         start = start_of(signal, j1939=j1939)
-        value |= bits_of(field, message.length, int(start))
+        value |= bits_of(field, message.length, start)
         if not bits & ours:
             rest = {1} if signal.name == enable else rest_of(signal)
             own.append((field, frozenset({start, *rest})))

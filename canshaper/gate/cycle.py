@@ -106,7 +106,11 @@ MOST_ROUNDS = 50
 
 
 class FrameProcessor(Protocol):
-    """Takes frames and yields frames: a ``Controller``, or an object that wraps one."""
+    """Takes frames and yields frames to send: an object with the gate in it.
+
+    A ``GatedController``, or one that hands on its frames (``Recorder``, a measurement's drive). A
+    ``Controller`` would fit the type too, but its frames have passed no gate.
+    """
 
     @property
     def moves(self) -> bool:

@@ -1,6 +1,7 @@
 """Converts signals that cantools has loaded to fields, scales, sticks and commands of the gate."""
 
 import math
+import struct
 from typing import Any
 
 from canshaper.gate.fields import EPSILON, Command, Field, Part, Resolution, Stick
@@ -27,9 +28,12 @@ def field_of(message: Any, name: str) -> Field:
     return Field(shift, (1 << signal.length) - 1, sign, int(big), real)
 
 
-def bits_of(field: Field, length: int, raw: int = -1) -> int:
+def bits_of(field: Field, length: int, raw: float | None = None) -> int:
     """Return the bits of a field (all, or a raw value) in a frame of ``length``, byte 0 lowest."""
-    placed = (raw & field.mask) << field.shift
+    number = field.mask if raw is None else int(raw) & field.mask
+    if field.real and raw is not None:
+        number = int.from_bytes(struct.pack(field.real, raw), "little")
+    placed = number << field.shift
     return int.from_bytes(placed.to_bytes(length, "big" if field.order else "little"), "little")
 
 
@@ -129,7 +133,8 @@ def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
 def start_of(signal: Any, *, j1939: bool) -> float:
     """Return the raw value of an unset signal: GenSigStartValue; else all ones in J1939, or 0."""
     if signal.is_float:
-        return float(signal.raw_initial or 0.0)
+        real = REALS[signal.length]
+        return float(struct.unpack(real, struct.pack(real, signal.raw_initial or 0.0))[0])
     low, high = ends_of(signal)
     if j1939 and signal.raw_initial is None:
         return -1 if signal.is_signed else high

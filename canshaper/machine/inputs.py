@@ -228,6 +228,7 @@ def _bind_position(
         return None
     if not alone and used.uses.get(signal.name) != "signal":  # two parts may read one position
         used.use((*place, "signal"), signal, "signal")
+    used.check_errors(signal)
     return used, BoundValue(**{**vars(bound), "config": config}, signal=signal)
 
 
@@ -272,7 +273,11 @@ def _bind_value(
         return None
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
-    return (used, BoundValue(**vars(bound), signal=signal)) if signal else None
+    if signal is None:
+        return None
+    if not isinstance(config, ProfileSwitch):  # a code that the file does not list selects nothing
+        used.check_errors(signal)
+    return used, BoundValue(**vars(bound), signal=signal)
 
 
 def check_source(used: UsedMessage, what: str) -> None:

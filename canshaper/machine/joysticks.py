@@ -217,6 +217,7 @@ def _bind_velocity(
             fault += "; with direction flags it is right"
         used.add_fault(fault)
         return None
+    used.check_errors(signal)
     used.check_unused((*place, "signal"), signal)
     _check_neutral(used, place, signal, command)
     if command.full is not None and (fault := few_steps(signal, full_scale(signal))):
@@ -250,6 +251,7 @@ def _bind_rocker(
         if fault := magnitude_range(signal):
             used.add_fault(fault)
             continue
+        used.check_errors(signal)
         used.check_unused(place, signal, also)
         _check_neutral(used, place, signal, command)
         velocities.append(VelocitySignal.of(signal))

@@ -161,6 +161,7 @@ def _factor(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> tuple[Si
     if signal is None:
         return None
     used.use(place, signal, f"the sway of {axis}")
+    used.check_errors(signal)
     units = UNITS[sensor.measured]
     factor = units.get((signal.unit or "").strip())
     if factor is None:

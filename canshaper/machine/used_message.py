@@ -13,7 +13,15 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.frame import STATE_BITS
 from canshaper.codec.layout import Chosen, is_j1939
 from canshaper.codec.sense import contrary, shows_sway_control
-from canshaper.codec.signals import code_fault, find_signal, names_broken, raw_fault, raw_limits
+from canshaper.codec.signals import (
+    code_fault,
+    find_signal,
+    j1939_code,
+    j1939_fault,
+    names_broken,
+    raw_fault,
+    raw_limits,
+)
 from canshaper.config.source import Diagnostics, Place
 from canshaper.errors import there_are
 from canshaper.machine.database import DbcFile
@@ -178,6 +186,11 @@ class UsedMessage:
         if signal is None:
             return
         fault = next((f for raw in means if (f := code_fault(signal, raw))), None)
+        if is_j1939(self.message) and (first := j1939_code(signal)) is not None:
+            raw = max(means)
+            if raw >= first and raw not in (signal.choices or {}):
+                text = f"{signal.name}: expected a code below {first}, as the others are errors in"
+                fault = fault or f"{text} J1939, or a name for it (VAL_), got {raw}"
         if wrong and not fault:
             fault = raw_fault(signal) or contrary_fault(signal, place[-1], wrong)
         if fault:
@@ -212,6 +225,11 @@ class UsedMessage:
                 text = f"expected {rest:g}, rest, or a value that VAL_ names: no axis uses it and"
                 text += f" every frame of {self.message.name} carries it; got {raw:g}, {value:g}"
                 self.add_fault(f"{signal.name}: GenSigStartValue: {text} {unit}".rstrip())
+
+    def check_errors(self, signal: Signal) -> None:
+        """Check that no error code of J1939 is read as a measurement."""
+        if is_j1939(self.message):
+            self.add_fault(j1939_fault(signal))
 
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
         """Check that a signal is an integer, and unsigned unless ``signed``."""

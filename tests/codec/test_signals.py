@@ -1,5 +1,7 @@
 """Range, names of values and start value that a DBC gives a signal."""
 
+from typing import Any
+
 import cantools
 import pytest
 from cantools.database.can import Message, Signal
@@ -10,6 +12,8 @@ from canshaper.codec.signals import (
     LEAST_STEPS,
     command_fault,
     full_scale,
+    j1939_code,
+    j1939_fault,
     magnitude_range,
     radius_range,
     set_point_fault,
@@ -202,3 +206,39 @@ def test_physical_and_raw_values() -> None:
     fields = FieldSet(message(STARTS))
     assert [fields.raw("Signed", v) for v in (-10.0, -8.0, -99.0, 99.0)] == [0, 4, -8, 7]
     assert [fields.value("Signed", raw) for raw in (0, 4, -8)] == [-10.0, -8.0, -14.0]
+
+
+@pytest.mark.parametrize(
+    ("bits", "first"),
+    [(1, None), (2, 2), (3, 6), (8, 254), (10, 1022), (12, 4094), (16, 0xFE00), (24, 0xFE0000)],
+)
+def test_error_codes_of_j1939(bits: int, first: int | None) -> None:
+    assert j1939_code(signal(0.0, 1.0, bits=bits)) == first
+    end = float((1 << bits) - 1)
+    assert (j1939_fault(signal(0.0, end, bits=bits)) is None) == (first is None)
+    assert j1939_fault(signal(0.0, int(0.99 * (first or 2)), bits=bits)) is None
+
+
+def test_signed_signals_and_floats_have_no_error_codes_of_j1939() -> None:
+    assert j1939_fault(signal(None, None)) is None
+    assert j1939_fault(signal(None, None, bits=16, is_float=True)) is None
+
+
+@pytest.mark.parametrize(
+    ("conversion", "names", "first"),
+    [
+        ((None, None), (), 254),
+        ((0.0, 255.0), (254,), 255),
+        ((0.0, 255.0), (255,), 254),
+        ((0.0, 255.0), (254, 255), None),
+        ((0.0, 254.0), (254,), None),
+        ((-255.0, 0.0, -1.0), (), 254),
+        ((-100.0, 100.0, 1.0, -155.0), (), 254),
+        ((-100.0, -99.5, 0.5, -227.25), (), 255),  # only the last one is in the range
+    ],
+)
+def test_a_code_of_j1939_in_the_range_needs_a_name(
+    conversion: tuple[Any, ...], names: tuple[int, ...], first: int | None
+) -> None:
+    fault = j1939_fault(signal(*conversion, choices=dict.fromkeys(names, "Error"), bits=8))
+    assert fault is None if first is None else f": {first} would be " in str(fault)

@@ -74,3 +74,39 @@ class TestLength:
         for _ in range(200):
             one.step(None, TICK_S, rests=False)
         assert one.length_m == 30.0
+
+
+def state_after(lost_s: float, length_m: float, without: float | None = None) -> str:
+    """State when a rope of 10 m is measured again, which was lost for some time."""
+    rope = RopeLength(1.0, 12.0, "hold")
+    for _ in range(100):
+        rope.step(10.0, 0.02, rests=True)
+    for _ in range(round(lost_s / 0.02)):
+        rope.step(without, 0.02, rests=False)
+        assert rope.state == "lost"
+    rope.step(length_m, 0.02, rests=False)
+    return rope.state
+
+
+@pytest.mark.parametrize("without", [None, 0.0])
+def test_a_lost_reading_hides_no_jump(without: float | None) -> None:
+    assert state_after(0.0, 2.0) == state_after(0.02, 2.0, without) == "jumped"
+    assert state_after(0.02, 8.5, without) == "known"
+
+
+@pytest.mark.parametrize(("lost_s", "way_m"), [(1.0, 4.8), (2.0, 7.8)])
+def test_a_lost_rope_may_have_run_all_the_time(lost_s: float, way_m: float) -> None:
+    """At 3 m/s, for the time lost and up to half a second between two values, and 0.3 m."""
+    assert state_after(lost_s, 10.0 - way_m + 0.01) == "known"
+    assert state_after(lost_s, 10.0 - way_m - 0.01) == "jumped"
+
+
+def test_after_four_seconds_the_length_before_says_nothing() -> None:
+    assert state_after(4.0, 0.1) == state_after(4.0, 12.0) == "known"
+
+
+def test_time_lost_before_counts_once() -> None:
+    rope = RopeLength(1.0, 12.0, "hold")
+    for measured_m in (10.0, *[None] * 200, 10.0, 2.0):
+        rope.step(measured_m, 0.02, rests=False)
+    assert rope.state == "jumped"

@@ -12,6 +12,7 @@ from canshaper.gate.rules import OTHERS
 from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
 from tests.gate.bench import Bench, bench, load
+from tests.rigs.files import Machine
 
 
 def test_what_was_withheld_leaves_no_gap() -> None:
@@ -86,6 +87,25 @@ def test_the_log_names_what_is_wrong() -> None:
         data = one.frame(0)
         word = int.from_bytes(data, "little") ^ change
         assert one.gate.leaving(one.key, word.to_bytes(len(data), "little")) == why
+
+
+@pytest.mark.parametrize("start", [1.5, 100.1, 0.0])
+@pytest.mark.parametrize("place", ["32|32@1-", "39|32@0-"])
+def test_a_float_that_no_axis_uses_leaves_as_it_starts(
+    machine: Machine, place: str, start: float
+) -> None:
+    machine.in_dbc(
+        "BO_ 512 SlewCommand: 2 SHAPER\n",
+        f'BO_ 512 SlewCommand: 8 SHAPER\n SG_ Gain : {place} (1,0) [0|100] "" VALVES\n',
+    )
+    machine.dbc += f'BA_ "GenSigStartValue" SG_ 512 Gain {start};\nSIG_VALTYPE_ 512 Gain : 1;\n'
+    one = Bench(machine.load(), "slew")
+    one.gate.tick(0, 0)
+    data = one.frame(0)
+    assert one.gate.leaving(one.key, data) == ""
+    one.gate.tick(1, 0)
+    wrong = data[:-1] + bytes([data[-1] ^ 1])
+    assert "limit=" in one.gate.leaving(one.key, wrong)
 
 
 class Gateway:

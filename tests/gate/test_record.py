@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from canshaper.gate.build import _valve_key, record_of
-from canshaper.gate.signals import start_of
+from canshaper.gate.fields import word_of
+from canshaper.gate.signals import field_of, start_of
 from canshaper.machine.binding import load_deployment
 from tests.gate.bench import load
 from tests.gate.test_decoder import message
@@ -35,11 +36,15 @@ def test_who_is_not_the_master_starts_no_node() -> None:
 
 
 def test_what_a_signal_carries_that_no_one_sets() -> None:
-    (real,) = message("Real : 0|32@1- (1,0) [0|0]", floats="Real").signals
+    one = message("Real : 0|32@1- (1,0) [0|0]", floats="Real")
+    (real,) = one.signals
     assert start_of(real, j1939=True) == 0.0
+    real.raw_initial = 100.1
+    carried = field_of(one, "Real").raw(word_of(one.encode({"Real": 100.1})))
+    assert start_of(real, j1939=True) == carried != 100.1  # as its bits hold it
     signed, plain = message("A : 0|8@1- (1,0) [0|0]", "B : 8|8@1+ (1,0) [0|0]").signals
-    assert [start_of(one, j1939=True) for one in (signed, plain)] == [-1, 255]
-    assert [start_of(one, j1939=False) for one in (signed, plain)] == [0, 0]
+    assert [start_of(s, j1939=True) for s in (signed, plain)] == [-1, 255]
+    assert [start_of(s, j1939=False) for s in (signed, plain)] == [0, 0]
     for start, expected in ((7, 7), (300, 255), (-1, 0)):
         plain.raw_initial = start
         assert start_of(plain, j1939=True) == expected

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.shaping.states import Reason
 from tests.rigs.files import Machine
 
 J1939 = ("j1939-forwarder", "j1939-bjm-avc")
@@ -75,6 +76,77 @@ def test_what_a_protocol_refuses(
     tmp_path: Path, names: tuple[str, str], changes: list[tuple[str, str]], says: str
 ) -> None:
     assert changed(tmp_path, names, *changes).faults() == [says]
+
+
+POSITION = ("XPosition : 6|10@1+ (0.1,0) [0|100]", "XPosition : 6|10@1+ (0.1,0) [0|102.3]")
+UNNAMED = ('XPosition 1022 "Error" 1023 "NotAvailable" ;', 'Button4 2 "Error" ;')
+FLOW = ("ExtendFlow : 0|8@1+ (1,-125) [-125|125]", "ExtendFlow : 0|8@1+ (1,-125) [0|0]")
+FLOW_NAMES = ('ExtendFlow 254 "Error" 255 "NotAvailable"', 'ExtendFlow 254 "Error"')
+FULL = ("signal: XPosition\n", "signal: XPosition\n      full: 100\n")
+ERRORS = "expected a range that ends before the error codes of J1939,"
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            [POSITION, UNNAMED],
+            {
+                f"BJM1: XPosition: {ERRORS} 1022 to 1023, or names for them (VAL_), got"
+                " [0|102.3]: 1022 would be 102.2 %"
+            },
+        ),
+        (
+            [FLOW, FLOW_NAMES],
+            {
+                f"AVEF{n}: ExtendFlow: {ERRORS} 254 to 255, or names for them (VAL_), got no range:"
+                " 255 would be 130 %"
+                for n in range(3)
+            },
+        ),
+    ],
+)
+def test_an_error_of_j1939_is_no_measurement(
+    tmp_path: Path, changes: list[tuple[str, str]], says: set[str]
+) -> None:
+    """All bits 1, not available, would otherwise be full speed."""
+    assert set(changed(tmp_path, J1939, *changes).faults()) == says
+
+
+@pytest.mark.parametrize("changes", [[POSITION], [UNNAMED], [POSITION, UNNAMED, FULL]])
+def test_an_error_of_j1939_has_a_name_or_lies_out_of_the_range(
+    tmp_path: Path, changes: list[tuple[str, str]]
+) -> None:
+    joystick = changed(tmp_path, J1939, *changes).load().joysticks["left"]
+    position = joystick.velocities[0]
+    flags = {"XNeutral": 0, "XNegative": 0, "XPositive": 1}
+    command = position.read({"XPosition": 1000, **flags})
+    assert command == pytest.approx(1000 / 1023 if changes == [POSITION] else 1.0)
+    for raw in (1022, 1023):
+        assert isinstance(position.read({"XPosition": raw, **flags}), Reason)
+
+
+@pytest.mark.parametrize(("code", "named"), [(1, False), (2, False), (3, False), (3, True)])
+def test_an_error_of_j1939_enables_nothing(tmp_path: Path, code: int, *, named: bool) -> None:
+    table = 'BJM3 Button1 0 "Released" 1 "Pressed" 2 "Error" 3 "NotAvailable" ;'
+    of = table.replace("BJM3", "VAL_ 2365446910")
+    other = 'VAL_ 2365446910 Button1 0 "Released" 3 "Pressed" ;' if named else ""
+    seat = "bus: crane, message: BJM3, source: 0x35, timeout_ms: 100, signal: Button1"
+    machine = changed(
+        tmp_path,
+        J1939,
+        (of, other),
+        ("Button1 : 46|2@1+ (1,0) [0|1]", "Button1 : 46|2@1+ (1,0) [0|3]"),
+        ("axes:\n", f"switches:\n  seat: {{ {seat}, code: {code} }}\n\naxes:\n"),
+        ("enable: Button1", "enable: [Button1, seat]"),
+    )
+    if named or code == 1:
+        assert machine.load().switches[0].switches["seat"] == ("Button1", code)
+        return
+    assert machine.faults() == [
+        "switches.seat.code: Button1: expected a code below 2, as the others are errors in J1939,"
+        f" or a name for it (VAL_), got {code}"
+    ]
 
 
 def test_a_group_with_a_destination_may_command_a_valve_and_be_read(tmp_path: Path) -> None:
