@@ -109,7 +109,7 @@ class FreeSwing:
         self.angle = self.rate = self.offset = 0.0
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Advance a tick; ``by`` is the change of an undriven swing, as of ``swing_over``."""
+        """Advance a tick; ``by`` is an undriven swing's change in it, see ``swing_over``."""
         angle, rate = self.angle, self.rate
         self.angle = angle + by[0] * angle + by[1] * rate
         self.rate = rate + by[2] * angle + by[3] * rate
@@ -131,7 +131,7 @@ class FreeSwing:
         return error * (1.0 - offset - (rate if self._rates else angle))
 
     def begin(self, unexplained: float) -> None:
-        """Start from the first measurement."""
+        """Begin angle, rate and gains with this measurement, as of ``error``; keep the offset."""
         self.angle = self.rate = 0.0
         self._gains = iter(self._first)
         self.correct(self.error(unexplained))
@@ -161,16 +161,16 @@ class TwoFreeSwings(FreeSwing):
         self._second = FreeSwing(measured, [(0.0, 0.0, 0.0)])
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Advance a tick."""
+        """Advance both modes a tick; ``by`` is the change of the first one."""
         super().step(by)
         self._second.step(self._by)
 
     def error(self, unexplained: float) -> float:
-        """Return the error as ``FreeSwing.error`` does."""
+        """Return ``unexplained`` less the free swing of both modes and the offset."""
         return self._second.error(super().error(unexplained))
 
     def correct(self, error: float) -> float:
-        """Correct as ``FreeSwing.correct`` does."""
+        """Correct both modes and the offset, and return the error that is left."""
         angle, rate = next(self._gains_of_second, self._first_of_second[-1])
         second = self._second
         second.angle += angle * error
@@ -178,7 +178,7 @@ class TwoFreeSwings(FreeSwing):
         return super().correct(error) - error * (rate if self._rates else angle)
 
     def begin(self, unexplained: float) -> None:
-        """Start from the first measurement."""
+        """Begin both modes again as ``FreeSwing.begin`` does; keep the offset."""
         self._second.angle = self._second.rate = 0.0
         self._gains_of_second = iter(self._first_of_second)
         super().begin(unexplained)

@@ -146,7 +146,7 @@ class SensedSway:
         self._observer.retune(sway)
 
     def restart(self) -> None:
-        """Restart because the model restarts and does not know its swing; feed nothing back."""
+        """Feed nothing back until proved again: the model restarts and does not know its swing."""
         self._observer.restart()
         self.weight = 0.0
         self._sway.free_angle = self._sway.free_rate = 0.0
@@ -190,7 +190,7 @@ class SensedSway:
                 self.state = Trust.TRUSTED
 
     def _refuted(self, value: float, other: float | None, error: float) -> bool:
-        """Return whether the sensor is shown not to measure the other axis; see ``CrossedSway``."""
+        """Return whether ``CrossedSway`` refutes that it measures ``other``; True where None."""
         if other is None:
             if self._crossed and self.state is not Trust.TRUSTED:
                 self._evidence.clear()  # that is no proof without the other axis
@@ -210,7 +210,10 @@ class SensedSway:
         self.length.add(value, offset, speed_m_s, pressed=commanded, free=free)
 
     def _doubt(self, why: Trust, *, again: bool = False) -> None:
-        """Distrust the sensor for a reason; ``again``: the observer has to begin again."""
+        """Distrust the sensor; an older fault stays unless ``why`` is in ``UNDOUBTED``.
+
+        ``again``: the observer has to begin again.
+        """
         if self.state is Trust.TRUSTED:
             self._needed = PROVED_AGAIN
             self._evidence.clear()

@@ -45,8 +45,8 @@ class Outcome:
         swings_on: in a pulse: ``still_s`` is a lower bound, since the drive ended before.
         stop_s: in a pulse: run-on after release until the tip stays below 5 % of full speed.
         run_on_m: in a pulse: travel after release; for slew on the largest radius.
-        dip: in a pulse: largest fall of the command while the joystick is held.
-        re_rise: in a pulse: largest rise of the command after release.
+        dip: in a pulse: largest fall of the command while the joystick is held, part of full.
+        re_rise: in a pulse: largest rise of the command after release, part of full.
     """
 
     candidate: str
@@ -144,7 +144,7 @@ def measure_all(
     on_progress: Callable[[float], None],
     processes: int | None = None,
 ) -> list[Outcome]:
-    """Drive every candidate through every manoeuvre, on all processors.
+    """Drive every candidate through every manoeuvre; return the outcomes in this order.
 
     An interrupt ends it and its processes at once.
 

@@ -72,7 +72,7 @@ class Row:
 
 
 def rows(compared: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
-    """Return one row for each candidate, in the order of the candidates."""
+    """Return one row for each candidate, in their order; ``outcomes`` include those of "off"."""
     raw = [o for o in outcomes if o.candidate == "off"]
     return [_row(c, [o for o in outcomes if o.candidate == c.name], raw) for c in compared]
 
@@ -141,11 +141,12 @@ def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, s
     """Return the filter to take by three priorities: its row, and a sentence with the reason.
 
     All three leave out filters that an operator feels dip (``FELT_DIP``); "off" never does. "fast"
-    stops soonest, "balanced" leaves least of those that stop in time, "calm" leaves least.
+    stops soonest of those that leave little (of all, if none does), "balanced" leaves least of
+    those that stop in time (of all, if none does), "calm" leaves least.
 
     Args:
         table: rows of the comparison, one of them "off".
-        period_s: period of the swing.
+        period_s: period of the swing of near-far.
     """
     off = next(r for r in table if r.name == "off")
     even = [r for r in table if r.dip <= FELT_DIP]

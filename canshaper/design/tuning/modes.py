@@ -106,6 +106,6 @@ def responses_of(
 def second_responses(
     second: SecondMode, tick_s: float, count: int, lengths: int = LENGTHS
 ) -> Responses:
-    """Return the responses of a second mode, with its decay up to the last tap."""
+    """Return the responses of a second mode, each with its decay from the tap to the last one."""
     responses = responses_of(second.mode, second.range_pct, tick_s, count, lengths)
     return responses / np.abs(responses[:, -1:])

@@ -107,7 +107,7 @@ def figure(
 
 
 def _ends(response: Sequence[float]) -> int:
-    """Return the tick from which the response stays at its final value."""
+    """Return the number of ticks until the response stays at its final value, and one more."""
     last = [k for k, value in enumerate(response) if abs(value - response[-1]) > 1e-3]
     return (last[-1] if last else 0) + 2
 

@@ -157,7 +157,7 @@ def on_axis(
 
 
 def verdicts(deployment: Deployment) -> Iterator[tuple[Place, Verdict]]:
-    """Yield (place, verdict) of each filter of a swaying axis, profiles and breakpoints too."""
+    """Yield (place, verdict) of each filter of a swaying axis, profiles too; none of kind "off"."""
     for name, bound in deployment.axes.items():
         for place, chosen, sway in every_filter(("axes", name), bound.config):
             if sway is not None and chosen.kind != "off":
