@@ -55,7 +55,8 @@ class FleetFilter:
         axis: name of the axis.
         section: its section ``filter``.
         sway: keys of its section ``sway`` that the filter was designed for.
-        tail_s: tail that the filter needs; None where that of the file is long enough.
+        tail_s: tail that the filter needs; None where that of the file is long enough, or a longer
+            one would exceed the stopping distance.
     """
 
     axis: str
@@ -68,7 +69,7 @@ def swinging(deployment: Deployment) -> dict[str, Sway]:
     """Return the axes with sway data, and the data.
 
     Raises:
-        DesignError: no axis has any, or one has several filters.
+        DesignError: no axis has any, or one has several filters or a rope.
     """
     axes = {}
     for name, axis in deployment.axes.items():
@@ -145,7 +146,7 @@ class Driven:
 
     @property
     def worst_deg(self) -> float:
-        """Mean residual swing of the worst drives."""
+        """Mean residual swing of the worst twentieth of the drives, deg."""
         count = math.ceil(_WORST * len(self.left_deg))
         return math.fsum(sorted(self.left_deg)[-count:]) / count
 

@@ -117,7 +117,7 @@ def _native(source_path: str, files: tuple[tuple[str, bytes], ...]) -> NativeCra
 
 
 def drive_all(source: Source, seeds: Seeds, *, both: int = -1) -> list[Row]:
-    """Draw, drive and measure drives; return their rows. Both engines drive the seed ``both``."""
+    """Drive and measure drives; return the rows. Both engines drive ``both`` and each 50th seed."""
     deployment = source.load()
     nominal = changed_parameters([*source.changes], deployment)
     native = source.native()

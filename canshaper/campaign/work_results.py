@@ -119,7 +119,7 @@ def do_all(
     works: Sequence[Work],
     done: Done | None = None,
 ) -> Done:
-    """Do all works and return them in this order; ``done`` gets each work when it is done."""
+    """Do all works; return them in this order. ``done`` gets each when it is done, in any order."""
     done = {} if done is None else done
     for work, moves in engine.run(partial(do_work, source), works):
         done[work] = moves
@@ -221,7 +221,7 @@ def _seconds(moves: Sequence[Move], load: str | None = None) -> float:
 
 
 def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, float]:
-    """Return the change of the mean, %, and its bounds by the bootstrap over pairs."""
+    """Return (change of the mean, its low and high 95 % bound), %, by the bootstrap over pairs."""
 
     def change(a: Any, b: Any, axis: int = -1) -> Any:
         return 100.0 * (np.mean(b, axis) / np.mean(a, axis) - 1.0)

@@ -46,7 +46,7 @@ const cs_config cs_tables = {};
 
 
 def sizes_source(tables: Numbers) -> str:
-    """Return ``cs_sizes.h``: the sizes of the arrays in the state."""
+    """Return ``cs_sizes.h``: the sizes of the arrays in the C's state."""
     axes = tables["axis"]
     sizes = {
         "CS_JOYSTICKS": len(tables["joystick"]),
@@ -119,7 +119,7 @@ def compiler() -> list[str]:
 
 
 def has_compiler() -> bool:
-    """Whether this machine has a C compiler."""
+    """Return whether this machine has a C compiler."""
     try:
         return bool(compiler())
     except NativeError:
@@ -244,7 +244,7 @@ class NativeController:
         )
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        """Run every axis that is due; return the valve frames to send."""
+        """Run every axis that is due after ``missed`` left-out ticks; return the valve frames."""
         now = ctypes.c_int64(now_ns)
         count = self._c.cs_tick(self._state, self._tables, now, missed, self._out)
         frames: Iterable[_CFrame] = self._out[:count]
