@@ -155,17 +155,19 @@ def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, s
     in_time = [r for r in even if r.stop_s <= BALANCED_PERIODS * period_s]
     balanced = min(in_time or even, key=lambda r: (r.worst_15_deg, r.stop_s))
     calm = min(even, key=lambda r: (r.worst_30_deg, r.stop_s))
+    little = ", of all that leave" if quiet else "; none leaves"
+    timely = " of all that stop" if in_time else "; none stops"
     return {
         "fast": (
             fast,
-            f"fast: {fast.name} stops soonest, {fast.stop_s:.1f} s after release, of all that leave"
+            f"fast: {fast.name} stops soonest, {fast.stop_s:.1f} s after release{little}"
             f" at most {100 * FAST_LEAVES:.0f} % of the unshaped swing at lengths within 15 %"
             f" ({fast.worst_15_deg:.1f} of {off.worst_15_deg:.1f} degrees)",
         ),
         "balanced": (
             balanced,
             f"balanced: {balanced.name} leaves least at lengths within 15 %"
-            f" ({balanced.worst_15_deg:.1f} degrees) of all that stop within"
+            f" ({balanced.worst_15_deg:.1f} degrees){timely} within"
             f" {BALANCED_PERIODS:g} of a swing ({balanced.stop_s:.1f} s)",
         ),
         "calm": (
