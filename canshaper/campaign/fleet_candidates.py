@@ -159,7 +159,7 @@ and for G_FF the best robust shapers. A row may be empty.
 
 
 def table(asked: Driven, rows: Rows) -> Table:
-    """Return the table: residual swing of each row, deg; lengths are parts of those in the file."""
+    """Return the table: residual swing, deg, lengths as parts of the file's; ``asked`` is bold."""
     made = new_table("left, deg", "run-on, s", "lengths", "worst 5 %", "p50", "p99")
     for name, row in ((name, row) for name, own in rows.items() for row in own):
         of = row.candidate

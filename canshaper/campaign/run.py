@@ -56,7 +56,7 @@ class Source:
         engine: str = "python",
         longest_s: float = 0.0,
     ) -> "Source":
-        """Read the files of a deployment."""
+        """Read the files of a deployment; return its source with these other attributes."""
         path = deployment.path.absolute()  # links stay: the DBC files are named from there
         paths = [path, *(path.parent / name for name in deployment.config.dbc)]
         files = tuple((str(one), one.read_bytes()) for one in paths)

@@ -109,7 +109,7 @@ class Store:
         return len(self.seeds) - before
 
     def columns(self, names: Sequence[str] | None = None) -> dict[str, list[Any]]:
-        """Return the columns of all rows on the disk, ordered by seed; without rows {}."""
+        """Return columns (``names``, or all) of the rows on disk, ordered by seed; {} without."""
         tables = [_read(path, names) for path in parts(self.folder)]
         if not tables:
             return {}

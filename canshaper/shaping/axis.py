@@ -101,7 +101,7 @@ class ShapedAxis:
         return self.states.state not in MOVING
 
     def tick(self, joystick: CommandInput, added: float = 0.0) -> Transition | None:
-        """Run a whole tick: ``command`` and ``propagate``."""
+        """Run a whole tick, ``command`` and ``propagate``; return as ``command`` does."""
         transition = self.command(joystick, added)
         self.propagate()
         return transition
@@ -196,7 +196,7 @@ class ShapedAxis:
     def retune(
         self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper], past: Sequence[float] = ()
     ) -> None:
-        """Change sway data and filter, in motion too, without a jump of the output.
+        """Change sway mode and filter, which ``shaper_for`` makes, in motion too, without a jump.
 
         The model keeps the physical swing. The difference between both filters at this moment fades
         with ``transfer.BLEND_S``. With ``past`` (``applied`` in each tick since the axis was at
@@ -268,7 +268,7 @@ class ShapedAxis:
         return within(self.demand, -self.stage.limits.maximum, self.stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:
-        """Trip for an error of the filter, or an output that no frame carries; return the change.
+        """Trip for an error of the filter, or of the output; return the change from ``old``.
 
         The model starts again: its state may be spoilt too.
 

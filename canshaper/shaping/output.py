@@ -247,7 +247,7 @@ class OutputStage:
         self._carry = 0.0
 
     def stop_against(self, held: float) -> None:
-        """In a stop, end a run-on against the joystick: now by the fall, or after ``reversal``."""
+        """In a stop, end a run-on against the joystick ``held``: now, or after ``reversal``."""
         if held * self._side < 0.0:
             self._side, self._crossed = -self._side, 0
         if not self.reversal and held * self.ramp < 0.0:

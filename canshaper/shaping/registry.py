@@ -131,7 +131,7 @@ def position(sets: Sequence[ParameterSet], value: float) -> int:
 
 
 def at_position(sets: Sequence[ParameterSet], steps: int) -> ParameterSet:
-    """Return the set at a position, interpolated between two sets.
+    """Return the set at ``steps``, a result of ``position``, interpolated between two sets.
 
     Period, damping ratio, poles, taps and every other number are interpolated linearly; so poles
     stay real and negative, and taps keep the sum 1. Whole numbers are rounded.

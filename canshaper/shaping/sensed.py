@@ -140,7 +140,7 @@ class SensedSway:
             self._observer.swing(self._fading)
 
     def retune(self, sway: SwayModel) -> None:
-        """Continue with another model of the axis."""
+        """Continue with another model of the axis; trust and weight stay."""
         self._sway = sway
         self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
         self._observer.retune(sway)

@@ -82,7 +82,7 @@ class SmallStrokes:
         return self._forth(target, due, high)
 
     def _forth(self, target: float, due: float, most: float) -> float:
-        """Return the velocity of a small stroke in positive direction."""
+        """Return the velocity of a small positive stroke with the travel ``due``; 0 at its end."""
         least = self.least
         return max(min(least, most), min(target, due)) if due > LEFT * least else 0.0
 

@@ -27,7 +27,7 @@ def _require(name: str, value: float, low: float, high: float, unit: str) -> flo
 
 
 def _omega_rad_s(period_s: float, damping_ratio: float) -> float:
-    """Undamped natural frequency of a swing with this damped period."""
+    """Return the undamped natural frequency of a swing with this damped period."""
     return 2.0 * math.pi / (period_s * math.sqrt(1.0 - damping_ratio**2))
 
 

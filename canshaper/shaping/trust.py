@@ -144,7 +144,7 @@ class CrossedSway:
         self._evidence = Evidence(timing.measured, noise, timing.period_s)
 
     def refuted(self, value: float, other: float, error: float) -> bool:
-        """Take a measurement and its error under this axis; return whether both are refuted."""
+        """Take a measurement and its error by this axis; return whether both are refuted."""
         errors = self._same.error(value - other), self._negated.error(value + other)
         self._same.correct(errors[0])
         self._negated.correct(errors[1])
@@ -152,13 +152,13 @@ class CrossedSway:
         return self._evidence.proved(PROVED)
 
     def step(self, observer: SwayObserver) -> None:
-        """Advance a tick."""
+        """Advance the free swings of both hypotheses a tick, by the sway mode of ``observer``."""
         observer.swing(self._same)
         observer.swing(self._negated)
 
 
 def largest_jump(measured: Measured, noise: float, period_s: float) -> float:
-    """Return the largest jump of a measurement from its expected value, rad or rad/s."""
+    """Return the largest error of a measurement that is no jump, rad or rad/s."""
     jump = math.radians(JUMP_DEG_S if measured is Measured.RATE else JUMP_DEG)
     return jump * max(1.0, period_s / TICK_OF_NOISE_S) + JUMP_NOISE * noise
 

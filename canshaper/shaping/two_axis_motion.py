@@ -175,7 +175,7 @@ class TwoAxisMotion:
         return -height_m * lead, -height_m * rate, -height_m * speed, -height_m * acceleration
 
     def _moved(self, near_far: MovingAxis, elapsed_s: float) -> None:
-        """Count how far near-far was moved, and let it damp only within that limit."""
+        """Count how far near-far was moved; let it damp only within ``path_m``, ``farthest``."""
         if near_far.commanded or self.unattended:
             near_far.damps, near_far.damped, near_far.way = False, 0.0, 0.0
             return

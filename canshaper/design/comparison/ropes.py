@@ -232,7 +232,7 @@ Job = tuple[RopeFilter, Work]
 
 
 def left_deg(deployment: Deployment, job: Job) -> float:
-    """Return the largest swing that remains after a drive, degrees."""
+    """Drive the work of a job with its filter; return the largest swing after the dwell, deg."""
     (one, work), crane = job, changed_parameters([], deployment)
     strokes, rope_m = work.strokes, work.rope_m
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)

@@ -165,7 +165,7 @@ def _left(
 
 
 def table(setting: Setting, before: Setting | None, method: str) -> Table:
-    """Return a table of the setting and ``before``, that of the file, or None; see ``Residual``."""
+    """Return a table of ``before``, the file's setting or None, and the setting by ``method``."""
     columns = [setting] if before is None else [before, setting]
     result = new_table("", *([] if before is None else ["in the file"]), method)
 
