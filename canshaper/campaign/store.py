@@ -36,7 +36,7 @@ class Store:
         seeds: seeds of the drives that are kept, on the disk or still waiting in memory.
 
     Raises:
-        CampaignError: the folder has drives of another identity, or cannot be read.
+        CampaignError: the folder has drives of another identity, or cannot be made or read.
     """
 
     def __init__(self, folder: Path, about: dict[str, Any]) -> None:

@@ -165,7 +165,7 @@ class DriveOptions(TypedDict, total=False):
         prepare: called with the new controller before the drive, to replace its filter.
         crane: name of the crane that moves, if the deployment has several; the others stand still.
         disturb: returns a source of frames that disturbs those of the joysticks.
-        unit: file of an FMU in place of our crane.
+        unit: file of an FMU in place of our crane; raises DesignError where it is none.
     """
 
     bypass: bool

@@ -92,8 +92,8 @@ class SensedSway:
         Args:
             value: a new measurement, rad or rad/s, with the sign of the model; None without one.
             scale: rad per normalised angle of the model.
-            commanded: whether the operator demanded motion within the tail. Else nothing is fed
-                back to the valve, and swing that another axis makes proves nothing of the sensor.
+            commanded: whether the operator demanded motion within the tail. Else the valve damps
+                only where ``damps``, and swing of another axis proves nothing, but see ``other``.
             damps: whether the axis damps a swing that another axis makes.
             other: measurement that the other axis' sensor would show by that axis' own motion.
                 With it such a swing proves a sensor that has had no fault, see ``CrossedSway``.
