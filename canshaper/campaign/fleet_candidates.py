@@ -190,7 +190,7 @@ def verdict(asked: Driven, rows: Rows) -> str:
 
 
 def write_fleet(deployment: Deployment, filters: Sequence[FleetFilter], verb: str) -> list[str]:
-    """Write the filters into the file, all or none; return the changed lines and the notes."""
+    """Write the filters that ``verb`` designed, all or none; return changed lines and notes."""
     changes, notes = list[Change](), list[str]()
     for one in filters:
         gone = dict.fromkeys(deployment.axes[one.axis].config.filter.model_dump(exclude_none=True))

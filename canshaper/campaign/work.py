@@ -56,7 +56,7 @@ class SetUp:
 
     @property
     def options(self) -> DriveOptions:
-        """Options of the simulated drives."""
+        """Options of the simulated drives: anti-sway off, or a profile to choose."""
         if self.bypass or self.candidate or not self.name:
             return {"bypass": self.bypass}
         return {"prepare": choosing(self.name)}

@@ -123,8 +123,8 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
     """Give a function that returns whether Ctrl-C came; Ctrl-C then raises no exception.
 
     An exception within the pool's own lines would leave a lock taken, for which the end of the pool
-    then waits for ever. Outside the main thread, and in a background job of a shell, no Ctrl-C
-    comes: the function always returns False.
+    then waits for ever. Outside the main thread, and where Ctrl-C is ignored or has a handler, as
+    in a background job of a shell, the function always returns False.
     """
     seen = []
     before = signal.getsignal(signal.SIGINT)

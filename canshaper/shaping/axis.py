@@ -220,7 +220,7 @@ class ShapedAxis:
             self.sensed.retune(sway)
 
     def prepare(self, least: float, most: float) -> None:
-        """Prepare the filter, which has not run, for ``follow`` with factors from least to most."""
+        """Prepare the filter, which has not run, for factors of ``follow`` from least to most."""
         self.transfer.prepare(least, most)
 
     def follow(self, mode: SwayMode, factor: float) -> None:

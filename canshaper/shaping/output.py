@@ -273,7 +273,7 @@ class OutputStage:
         self._no_run_on -= 1
 
     def hold(self, demand: float, ticks: int) -> None:
-        """Count missed ticks, in which the demand held and the valve kept its output."""
+        """Count missed ticks, in which this demand stayed and the valve kept its output."""
         self._recent.age(ticks)
         self._demanded.age(ticks)
         self._no_run_on -= ticks

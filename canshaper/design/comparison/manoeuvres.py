@@ -210,7 +210,7 @@ class Manoeuvre:
 
 
 def manoeuvres() -> list[Manoeuvre]:
-    """Return all manoeuvres."""
+    """Return all manoeuvres, those of a single axis first."""
     single = [task for axis in AXES for task in _single(axis)]
     pulse = next(task for task in single if task.name == "pulse near-far")
     loading = SCRIPTS["loading"].strokes

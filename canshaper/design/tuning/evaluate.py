@@ -58,7 +58,7 @@ class Machine:
 
     @classmethod
     def of(cls, bound: BoundAxis) -> Self:
-        """Return the machine of an axis, with the values of its deployment."""
+        """Return the machine of an axis by its deployment; ``lag_s`` stays the default."""
         limits = bound.config.limits
         return cls(
             limits=limits.output_limits(),
