@@ -13,7 +13,7 @@ import math
 from canshaper.shaping.limits import OutputLimits
 
 # Strokes are small if the least step makes all of them within this time, s. With steps of 1/125
-# that is 0.6 s of full speed. Larger strokes are not made of single steps.
+# that is 0.4 to 0.9 s of full speed, by the deadband. Larger ones are not made of single steps.
 SMALL_S = 90.0
 # Ticks at the least step that may be left over: one more step would travel too far by as much.
 LEFT = 0.5
