@@ -97,7 +97,6 @@ def draw_drive(
     """Draw one drive.
 
     Args:
-        deployment: the machine.
         seed: seed of the drive, 0 or more.
         ranges: ranges of the crane's parameters.
         nominal: the crane that the ranges refer to; None for that of the file.

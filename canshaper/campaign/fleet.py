@@ -65,7 +65,6 @@ def design_fleet(
     A G_FF is compared with robust shapers of the same run-on.
 
     Args:
-        deployment: the machine.
         kind: kind of the filters, robust or gff.
         duration_s: see ``Candidate``. None: of robust the longest response in the file, or one
             swing; of G_FF a little less than ``dwell_s``; up to the shortest ``tail_s``.

@@ -46,8 +46,6 @@ def measured_drive(
     not how the controller makes a frame. A drive in C has no gate.
 
     Args:
-        deployment: the machine.
-        seed: seed of the drive.
         ranges: ranges of the crane's parameters.
         nominal: the crane that the ranges refer to; None for that of the file.
         native: the engine in C, for the drives that it supports; None for Python alone.

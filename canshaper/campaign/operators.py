@@ -25,11 +25,7 @@ T = TypeVar("T")
 
 
 class Draw:
-    """Uniform random numbers.
-
-    Args:
-        sequence: seed of the numbers.
-    """
+    """Uniform random numbers; ``sequence`` is their seed."""
 
     def __init__(self, sequence: np.random.SeedSequence) -> None:
         self._source = np.random.Generator(np.random.PCG64(sequence))

@@ -155,11 +155,7 @@ def run_campaign(
     """Do every drive that the store lacks. It keeps the finished ones even after an error.
 
     Args:
-        engine: does the drives.
-        source: the deployment.
-        seeds: seeds of the drives.
-        store: keeps the rows.
-        on_progress: called with the number of finished drives.
+        on_progress: called with the number of finished drives, those of before included.
 
     Raises:
         CampaignError: the engine fails, or the disk is full.

@@ -82,8 +82,6 @@ def practised(
     """Let each operator practise with each set-up; return works with the fastest techniques.
 
     Args:
-        source: the deployment.
-        set_ups: the set-ups to practise with.
         people: skills by operator.
         within: tolerance: tip from the target, m, and swing, degrees.
         do: does the working cycles.
@@ -139,10 +137,6 @@ def at_work(
     """Practise for one cycle and do each task, with each set-up.
 
     Args:
-        engine: does the works.
-        source: the deployment.
-        set_ups: the set-ups to compare.
-        tasks: tasks by name.
         progress: called with the part that is done, 0 to 1, and the name of the work.
         seeds: number of working cycles of each task with each set-up.
 

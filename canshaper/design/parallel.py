@@ -139,11 +139,7 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
 
 
 def _begin(parent: int) -> None:
-    """Set up a process of the pool.
-
-    Args:
-        parent: number of the process that started it.
-    """
+    """Set up a process of the pool, and end it if the process ``parent`` has ended already."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
     end_with_parent(signal.SIGKILL)  # the parent may have no time to end it
     # Not by the pipe of multiprocessing: a sibling that was forked later holds its other end too.

@@ -37,13 +37,10 @@ main()
 
 
 def end_with_parent(how: signal.Signals) -> None:
-    """Have the kernel send this process a signal when its parent ends (prctl(2)).
+    """Have the kernel send this process the signal ``how`` when its parent ends (prctl(2)).
 
     The kernel does not signal a parent that ended before the call: the caller checks for it
     afterwards. On systems other than Linux the function does nothing.
-
-    Args:
-        how: the signal.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, how)

@@ -93,13 +93,7 @@ def valve_keys(deployment: Deployment) -> list[MessageKey]:
 
 
 def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick]:
-    """Yield the ticks of a drive.
-
-    Args:
-        deployment: the machine.
-        seed: seed of the drive.
-        ticks: number of ticks.
-    """
+    """Yield so many ticks of a drive, which is the same for the same seed."""
     source = random.Random(seed)
     tick_ns = deployment.config.tick_ms * 1_000_000
     hands = {

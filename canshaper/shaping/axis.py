@@ -270,9 +270,8 @@ class ShapedAxis:
     def invalidate(self, old: State, error: Exception) -> Transition | None:
         """Trip for an error of the filter, or of the output; return the change from ``old``.
 
-        The model starts again: its state may be spoilt too.
-
-        In TRIPPED the first reason stays; the first error is returned, then None in each tick.
+        The model starts again: its state may be spoilt too. In TRIPPED the first reason stays; the
+        first error is returned, then None in each tick.
         """
         if self.states.state is not TRIPPED:
             self.states.trip(Reason.OUTPUT_INVALID)

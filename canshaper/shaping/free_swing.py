@@ -190,12 +190,7 @@ def observer_gains(
     """Return the Kalman gains of the first measurements, the steady state's last.
 
     Each has the gains of angle, rate and offset, then of angle and rate of any second mode.
-
-    Args:
-        mode: sway mode of the axis.
-        tick_s: time between two measurements, seconds.
-        timing: timing of the sensor.
-        limits: bounds of its measurements.
+    ``tick_s`` is the time between two measurements.
     """
     swing, ticks, offset = swing_over(mode, tick_s), tick_s / TICK_OF_NOISE_S, limits.offset
     rates, second = timing.measured is Measured.RATE, limits.second
@@ -220,14 +215,7 @@ def observer_gains(
 def sensor_gains(
     mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
 ) -> SensorGains:
-    """Return the gains of a sensor on an axis.
-
-    Args:
-        mode: sway mode of the axis.
-        tick_s: period of the axis, seconds.
-        timing: timing of the sensor.
-        limits: bounds of its measurements.
-    """
+    """Return the gains of a sensor on an axis, whose period is ``tick_s``."""
     period_s = max(1, round(timing.period_s / tick_s)) * tick_s
     one = observer_gains(mode, period_s, timing, replace(limits, second=None))
     two = observer_gains(mode, period_s, timing, limits) if limits.second else ()

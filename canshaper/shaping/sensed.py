@@ -210,10 +210,7 @@ class SensedSway:
         self.length.add(value, offset, speed_m_s, pressed=commanded, free=free)
 
     def _doubt(self, why: Trust, *, again: bool = False) -> None:
-        """Distrust the sensor; an older fault stays unless ``why`` is in ``UNDOUBTED``.
-
-        ``again``: the observer has to begin again.
-        """
+        """Distrust the sensor, where no older fault stays; ``again``: the observer begins again."""
         if self.state is Trust.TRUSTED:
             self._needed = PROVED_AGAIN
             self._evidence.clear()

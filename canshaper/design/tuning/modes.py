@@ -59,10 +59,8 @@ def second_mode(
 
     Args:
         first: nominal mode of the axis.
-        period_s: period of the second mode.
-        damping_ratio: damping ratio of the second mode.
+        period_s, damping_ratio: those of the second mode.
         range_pct: error of its pendulum length that the taps cover, +- percent.
-        tick_s: tick of the axis.
         rate_per_s: rate of the valve, full speeds per second.
 
     Raises:

@@ -44,7 +44,6 @@ def figure(
 
     Args:
         axis: name of the axis.
-        setting: the setting.
         mode: sway mode of the axis.
         tick_s: period of the axis, s.
         machine: limits and valve behind the filter.

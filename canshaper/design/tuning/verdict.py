@@ -142,7 +142,6 @@ def on_axis(
     Args:
         deployment: the machine; the axis gives the limits, with its stopping distance.
         axis: name of the axis.
-        chosen: the filter.
         sway: sway data; None for that of the axis.
         tail_s: tail in place of that of the file.
     """
