@@ -83,7 +83,6 @@ class NativeCrane:
     """Controller and crane of a deployment in C.
 
     Args:
-        deployment: the machine.
         sources: folder of the C of crane and measures.
         keeps: store the compiled library for later processes.
 

@@ -106,9 +106,7 @@ class LockStep:
     """A controller and a plant, tick by tick, through the I/O cycle of the daemon.
 
     Args:
-        deployment: the machine.
         processor: the controller, or a wrapper around it.
-        plant: the crane.
         joysticks: the sources of joystick frames.
         on_frame: called with every frame and its time in s; None if nobody listens.
         received: see ``PlantPort``.

@@ -135,8 +135,6 @@ def drive_on_bus(
     """Drive a script with three processes; record the frames received on the bus.
 
     Args:
-        deployment: the machine.
-        transport: the bus that connects the processes.
         script: the strokes of the operator.
         changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
         bypass: drive with anti-sway switched off.

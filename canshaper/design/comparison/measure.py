@@ -150,8 +150,6 @@ def measure_all(
 
     Args:
         file: deployment file, loaded again in every process.
-        candidates: the filters to compare.
-        tasks: the manoeuvres.
         on_progress: called with the part done, 0 to 1.
         processes: number of processes; by default one for each processor.
     """

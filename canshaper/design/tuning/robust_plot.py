@@ -61,8 +61,6 @@ def figure(
     """Return the picture: impulse response, step response, and residual over the length error.
 
     Args:
-        axis: name of the axis.
-        mode: sway mode of the axis.
         tick_s: period of the axis, s.
         machine: limits and valve behind the filter.
         filters: the new filter, and that of the file if there is one.
