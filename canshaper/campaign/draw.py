@@ -97,11 +97,13 @@ def draw_drive(
     """Draw one drive.
 
     Args:
-        deployment: the machine.
         seed: seed of the drive, 0 or more.
         ranges: ranges of the crane's parameters.
         nominal: the crane that the ranges refer to; None for that of the file.
         longest_s: longest ``dwell_s`` of all files that are driven with the same seeds.
+
+    Raises:
+        CampaignError: no axis moves the crane.
     """
     of_crane, of_operator, of_load, of_fault, of_place = (
         Draw(one) for one in np.random.SeedSequence(seed).spawn(5)
@@ -206,7 +208,7 @@ def _clamp(factors: dict[str, float], name: str, crane: Any) -> float:
 
 
 def _on_rope(nominal: Any, factors: dict[str, float]) -> Parameters:
-    """Return the parameters of the drawn rope, and of the radius where one was drawn."""
+    """Return the parameters of the drawn rope and radius; clamp both in ``factors`` too."""
     own: Parameters = {}
     if "radius_m" in factors:
         own["start_radius_m"] = _clamp(factors, "radius", nominal)
@@ -254,7 +256,7 @@ def _place(
 def _loads(
     draw: Draw, ranges: Uncertainty, duration_s: float, empty: Grapple
 ) -> tuple[list[tuple[float, Grapple]], dict[str, float]]:
-    """Draw a load; return what hangs from the tip from when on, and the drawn numbers."""
+    """Draw a load; return (time in s, grapple from then on) of each change, and drawn numbers."""
     loaded = draw.between(0.0, 100.0) < ranges.load_change_pct
     mass, lower_m = draw.between(*ranges.load_mass), draw.between(*ranges.load_m)
     times_s = [duration_s * draw.between(*part) for part in (_PICK_UP, _PUT_DOWN)]

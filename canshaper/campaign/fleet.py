@@ -65,10 +65,9 @@ def design_fleet(
     A G_FF is compared with robust shapers of the same run-on.
 
     Args:
-        deployment: the machine.
         kind: kind of the filters, robust or gff.
         duration_s: see ``Candidate``. None: of robust the longest response in the file, or one
-            swing; of G_FF a little less than ``dwell_s``.
+            swing; of G_FF a little less than ``dwell_s``; up to the shortest ``tail_s``.
         workers: processes that drive the candidates.
         on_progress: called with the part that is done, 0 to 1.
         front: also design for shorter and longer run-ons.
@@ -78,7 +77,7 @@ def design_fleet(
 
     Raises:
         ConfigError: the C does not support the machine.
-        DesignError: no axis swings, or one has several filters.
+        DesignError: no axis swings, or one has several filters or a rope; or the C has no drives.
         NativeError: the C cannot be compiled.
         UsageError: the run-on exceeds ``tail_s``, or no filter keeps it.
     """

@@ -55,7 +55,8 @@ class FleetFilter:
         axis: name of the axis.
         section: its section ``filter``.
         sway: keys of its section ``sway`` that the filter was designed for.
-        tail_s: tail that the filter needs; None where that of the file is long enough.
+        tail_s: tail that the filter needs; None where that of the file is long enough, or a longer
+            one would exceed the stopping distance.
     """
 
     axis: str
@@ -68,7 +69,7 @@ def swinging(deployment: Deployment) -> dict[str, Sway]:
     """Return the axes with sway data, and the data.
 
     Raises:
-        DesignError: no axis has any, or one has several filters.
+        DesignError: no axis has any, or one has several filters or a rope.
     """
     axes = {}
     for name, axis in deployment.axes.items():
@@ -145,7 +146,7 @@ class Driven:
 
     @property
     def worst_deg(self) -> float:
-        """Mean residual swing of the worst drives."""
+        """Mean residual swing of the worst twentieth of the drives, deg."""
         count = math.ceil(_WORST * len(self.left_deg))
         return math.fsum(sorted(self.left_deg)[-count:]) / count
 
@@ -158,7 +159,7 @@ and for G_FF the best robust shapers. A row may be empty.
 
 
 def table(asked: Driven, rows: Rows) -> Table:
-    """Return the table: residual swing of each row, deg; lengths are parts of those in the file."""
+    """Return the table: residual swing, deg, lengths as parts of the file's; ``asked`` is bold."""
     made = new_table("left, deg", "run-on, s", "lengths", "worst 5 %", "p50", "p99")
     for name, row in ((name, row) for name, own in rows.items() for row in own):
         of = row.candidate
@@ -189,7 +190,7 @@ def verdict(asked: Driven, rows: Rows) -> str:
 
 
 def write_fleet(deployment: Deployment, filters: Sequence[FleetFilter], verb: str) -> list[str]:
-    """Write the filters into the file, all or none; return the changed lines and the notes."""
+    """Write the filters that ``verb`` designed, all or none; return changed lines and notes."""
     changes, notes = list[Change](), list[str]()
     for one in filters:
         gone = dict.fromkeys(deployment.axes[one.axis].config.filter.model_dump(exclude_none=True))

@@ -46,17 +46,15 @@ def measured_drive(
     not how the controller makes a frame. A drive in C has no gate.
 
     Args:
-        deployment: the machine.
-        seed: seed of the drive.
         ranges: ranges of the crane's parameters.
-        nominal: the crane that the ranges refer to.
+        nominal: the crane that the ranges refer to; None for that of the file.
         native: the engine in C, for the drives that it supports; None for Python alone.
         both: drive with both engines, whatever the seed; see ``BOTH_OF``.
         longest_s: see ``draw_drive``.
-        unit: path of an FMU that replaces the crane.
+        unit: path of an FMU that replaces the crane; then ``native`` has to be None.
 
     Raises:
-        CampaignError: the two engines measured different values.
+        CampaignError: the two engines measured different values, though the gate refused nothing.
     """
     setting = draw_drive(deployment, seed, ranges, nominal, longest_s)
     nominal = nominal or changed_parameters([], deployment)
@@ -82,7 +80,7 @@ def _row(
     nominal: CraneParameters,
     native: NativeCrane | None = None,
 ) -> Row:
-    """Drive a setting, and with anti-sway off too where a switch can do that; return its row."""
+    """Drive a setting, also with anti-sway off if it has no fault and a switch; return the row."""
     drive = _Drive(deployment, setting, nominal, native)
     off = switches_off(deployment) and not setting.fault
     raw = _Drive(deployment, setting, nominal, native, bypass=True) if off else None
@@ -229,7 +227,7 @@ class _Tracks:
         return self._across if moved in (SLEW, BRIDGE) else self._along
 
     def _travel_errors(self, axes: Mapping[str, AxisTrace]) -> Iterator[float]:
-        """Yield the travel error of each axis: travel less demanded travel, in s of full speed."""
+        """Yield |travel - demanded travel| of each axis, in s of full speed."""
         for name, axis in axes.items():
             most = self._limits[name].maximum
             commanded = math.fsum(min(max(one, -most), most) for one in axis.joystick)

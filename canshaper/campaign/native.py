@@ -83,7 +83,6 @@ class NativeCrane:
     """Controller and crane of a deployment in C.
 
     Args:
-        deployment: the machine.
         sources: folder of the C of crane and measures.
         keeps: store the compiled library for later processes.
 
@@ -136,7 +135,7 @@ class NativeCrane:
         self._numbered = Numbered(JoystickNode(deployment, still))
 
     def has(self, setting: Setting) -> bool:
-        """Whether the C supports the drawn crane."""
+        """Return whether the C supports the drawn crane."""
         parameters = setting.options["parameters"]
         return parameters is not None and is_simple(parameters)
 
@@ -242,7 +241,7 @@ def _check_functions(c: Any) -> None:
 
 
 def _wiring(deployment: Deployment, axis: str | None) -> dict[str, int]:
-    """Return where the simulated valve of an axis finds its command in the frames."""
+    """Return where the simulated valve finds its command in the frames; axis -1 for none."""
     if axis is None:
         return {"axis": -1}
     reader = CommandReader(deployment, axis)
@@ -251,7 +250,7 @@ def _wiring(deployment: Deployment, axis: str | None) -> dict[str, int]:
 
 
 def steps_of(tick_ms: int) -> dict[str, Any]:
-    """Return length and number of the integration steps of a tick."""
+    """Return length, s, and number of the integration steps of a tick: step_s, steps."""
     steps = math.ceil(tick_ms / 1000.0 / INTERNAL_STEP_S - 1e-9)
     return {"step_s": tick_ms / 1000.0 / steps, "steps": steps}
 
@@ -277,7 +276,7 @@ def grapple_numbers(grapple: Grapple) -> Sequence[float]:
 
 
 def is_simple(p: CraneParameters) -> bool:
-    """Whether the C supports every parameter of this crane."""
+    """Return whether the C supports every parameter of this crane."""
     valves = [getattr(p, axis) for axis in TIP_AXES]
     compensated = not any(getattr(one, name) for one in valves for name in _UNCOMPENSATED)
     calm = p.carrier.level and not (p.wind.speed_m_s or p.wind.gust_m_s)

@@ -25,11 +25,7 @@ T = TypeVar("T")
 
 
 class Draw:
-    """Uniform random numbers.
-
-    Args:
-        sequence: seed of the numbers.
-    """
+    """Uniform random numbers; ``sequence`` is their seed."""
 
     def __init__(self, sequence: np.random.SeedSequence) -> None:
         self._source = np.random.Generator(np.random.PCG64(sequence))
@@ -150,7 +146,7 @@ class _Disturbed:
 
     Args:
         joysticks: source of the frames.
-        kind: lost, late or garbled: what happens to a disturbed frame.
+        kind: lost, late (by a tick) or garbled (a wrong bit): what happens to a disturbed frame.
         share: share of the frames that are disturbed.
         ms: begin and end of the disturbance.
         seed: seed of the choice of frames.
@@ -164,7 +160,7 @@ class _Disturbed:
         self._late: list[Frame] = []
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> Sequence[Frame]:
-        """Frames that came since the last tick, in order."""
+        """Return the frames that came since the last tick, in order; the late ones first."""
         arrived, self._late = self._late, []
         for frame in self._joysticks.frames_of_tick(time_ms, tick_ms):
             hit = self._random.random() < self._share
@@ -194,7 +190,7 @@ class Numbered:
         self._by_tick: list[list[Frame]] = []
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> Sequence[Frame]:
-        """Frames that came since the last tick, in order."""
+        """Return the numbered frames that came since the last tick, in order."""
         while (at_ms := len(self._by_tick) * tick_ms) <= time_ms:
             sent = self._joysticks.frames_of_tick(at_ms, tick_ms)
             self._by_tick.append(
@@ -218,6 +214,6 @@ def bus_fault(draw: Draw, duration_s: float) -> Fault:
 
 
 def sensor_fault(draw: Draw, duration_s: float) -> Fault:
-    """Draw a fault of the sway sensor and its time."""
+    """Draw a fault of the sway sensor, and when in the drive it begins."""
     kind = draw.one_of(("lost", "stuck", "reversed", "jump"))
     return Fault(f"sensor {kind}", sensor={f"{kind}_s": draw.between(0.0, duration_s)})

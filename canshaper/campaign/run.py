@@ -56,7 +56,7 @@ class Source:
         engine: str = "python",
         longest_s: float = 0.0,
     ) -> "Source":
-        """Read the files of a deployment."""
+        """Read the files of a deployment; return its source with these other attributes."""
         path = deployment.path.absolute()  # links stay: the DBC files are named from there
         paths = [path, *(path.parent / name for name in deployment.config.dbc)]
         files = tuple((str(one), one.read_bytes()) for one in paths)
@@ -117,7 +117,7 @@ def _native(source_path: str, files: tuple[tuple[str, bytes], ...]) -> NativeCra
 
 
 def drive_all(source: Source, seeds: Seeds, *, both: int = -1) -> list[Row]:
-    """Draw, drive and measure drives; return their rows. Both engines drive the seed ``both``."""
+    """Drive and measure drives; return the rows. Both engines drive ``both`` and each 50th seed."""
     deployment = source.load()
     nominal = changed_parameters([*source.changes], deployment)
     native = source.native()
@@ -155,11 +155,7 @@ def run_campaign(
     """Do every drive that the store lacks. It keeps the finished ones even after an error.
 
     Args:
-        engine: does the drives.
-        source: the deployment.
-        seeds: seeds of the drives.
-        store: keeps the rows.
-        on_progress: called with the number of finished drives.
+        on_progress: called with the number of finished drives, those of before included.
 
     Raises:
         CampaignError: the engine fails, or the disk is full.

@@ -105,6 +105,8 @@ def influences(
 ) -> list[Influence]:
     """Return the factors, ordered by how much of a measure they explain.
 
+    A factor with one value only is left out; with fewer than 20 measured drives all are.
+
     Args:
         factors: by the name of the factor a number or a word for each drive.
         measure: the measure of each drive; a drive with None is left out.
@@ -157,7 +159,7 @@ class Difference:
 
 
 def differences(first: Columns, second: Columns) -> dict[str, Difference]:
-    """Compare the measures of two files over the drives without a fault that both have."""
+    """Compare two files by measure, over the drives without a fault in which both have it."""
     rows = [
         {seed: k for k, seed in enumerate(one["seed"]) if not one["fault"][k]}
         for one in (first, second)

@@ -33,10 +33,10 @@ class Store:
         about: identity of the drives, see ``Source.about``.
 
     Attributes:
-        seeds: seeds of the drives that are kept.
+        seeds: seeds of the drives that are kept, on the disk or still waiting in memory.
 
     Raises:
-        CampaignError: the folder has drives of another identity, or cannot be read.
+        CampaignError: the folder has drives of another identity, or cannot be made or read.
     """
 
     def __init__(self, folder: Path, about: dict[str, Any]) -> None:
@@ -52,7 +52,7 @@ class Store:
         self._look()
 
     def add(self, rows: Iterable[dict[str, Any]]) -> None:
-        """Add rows; leave out those whose drive is kept already."""
+        """Add rows, but none of a drive that is kept already; now and then ``flush`` them."""
         for row in rows:
             if row["seed"] not in self.seeds:
                 self.seeds.add(row["seed"])
@@ -61,10 +61,10 @@ class Store:
             self.flush()
 
     def flush(self) -> None:
-        """Write the waiting rows to the disk, all or none.
+        """Write the waiting rows to the disk, all or none; drop those that others have stored.
 
         Raises:
-            CampaignError: the disk refuses them.
+            CampaignError: the disk refuses them, or the folder has got drives of another identity.
         """
         self._flushed_s = monotonic()
         others = self._look()
@@ -93,7 +93,7 @@ class Store:
         self._rows = []
 
     def merge(self, folder: Path) -> int:
-        """Add the rows of another folder; return how many were new.
+        """Add the rows of another folder and write them; return how many were new.
 
         Raises:
             CampaignError: its drives have another identity, or it has none.
@@ -109,7 +109,7 @@ class Store:
         return len(self.seeds) - before
 
     def columns(self, names: Sequence[str] | None = None) -> dict[str, list[Any]]:
-        """Return the columns of all rows on the disk, ordered by seed."""
+        """Return columns (``names``, or all) of the rows on disk, ordered by seed; {} without."""
         tables = [_read(path, names) for path in parts(self.folder)]
         if not tables:
             return {}

@@ -88,11 +88,11 @@ class Summary:
     Attributes:
         quantiles: quantiles of the drives without a fault, by measure and name.
         faulty: quantiles of the drives with a fault.
-        counts: number of drives without a fault, with one, and with a grapple that swung over.
+        counts: number of drives: without_fault, with_fault, and of both together swung_over.
         engines: number of drives by engine: native, python, both.
         promises, worse: see their classes.
         influences: factors by measure, the one that explains most first.
-        worst: drives without a fault that leave the most swing.
+        worst: the ten drives without a fault that leave the most swing.
         verdicts: one for each limit of the file.
     """
 
@@ -175,7 +175,7 @@ def _quantiles(columns: Columns) -> dict[str, dict[str, Quantile]]:
 
 
 def worst(columns: Columns) -> list[dict[str, Any]]:
-    """Return the drives without a fault that leave the most swing, the worst one first."""
+    """Return the ten drives without a fault that leave the most swing, the worst one first."""
     faults = columns["fault"]
     order = sorted(
         (k for k, value in enumerate(columns[FIRST]) if value is not None and not faults[k]),

@@ -56,7 +56,7 @@ class SetUp:
 
     @property
     def options(self) -> DriveOptions:
-        """Options of the simulated drives."""
+        """Options of the simulated drives: anti-sway off, or a profile to choose."""
         if self.bypass or self.candidate or not self.name:
             return {"bypass": self.bypass}
         return {"prepare": choosing(self.name)}
@@ -64,27 +64,44 @@ class SetUp:
 
 @dataclass(frozen=True)
 class Work:
-    """One working cycle: set-up, operator, tolerance and places."""
+    """One working cycle: set-up, operator, tolerance and places.
+
+    Attributes:
+        known: see ``learn``.
+        techniques: (part of full speed, share of the swing that he catches) for each load.
+        within: tolerance: (tip from the target, m; swing, degrees; infinite: any).
+        seed: seed of places and operator.
+    """
 
     set_up: SetUp
     operator: str
     skill: Skill
-    known: tuple[Known, ...]  # by axis; of slew in rad, where m is said
-    techniques: tuple[tuple[float, float], ...]  # speed and share of caught swing, for each load
-    within: tuple[float, float]  # tip from the target, m, and swing, degrees; infinite: any
-    seed: str  # seed of places and operator
+    known: tuple[Known, ...]
+    techniques: tuple[tuple[float, float], ...]
+    within: tuple[float, float]
+    seed: str
 
 
 class Move(NamedTuple):
-    """Result of one move."""
+    """Result of one move.
+
+    Attributes:
+        load: one of ``LOADS``.
+        done: whether it ended within ``LIMIT_S``, and without a grapple above the horizontal.
+        seconds: its duration; ``LIMIT_S`` where it is not done.
+        taps: number of corrections and catches.
+        waiting_s: time with every joystick neutral.
+        peak_deg: largest tilt of the grapple.
+        beyond_m: largest overshoot of an axis.
+    """
 
     load: str
     done: bool = False
     seconds: float = LIMIT_S
-    taps: int = 0  # number of corrections and catches
-    waiting_s: float = 0.0  # time with every joystick neutral
+    taps: int = 0
+    waiting_s: float = 0.0
     peak_deg: float = 90.0
-    beyond_m: float = 0.0  # largest overshoot of an axis
+    beyond_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +116,7 @@ class _Joysticks(Script):
 
 
 def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
-    """Return slew angle and radius of the start and of each target: bunk, pile, bunk, ..."""
+    """Return (slew, rad; radius, m) of start and targets: bunk, pile, ..., as far as it reaches."""
     source = random.Random(f"places {seed}")
     side, at = source.choice((-1.0, 1.0)), []
     for number in range(MOVES + 1):
@@ -112,6 +129,9 @@ def places(crane: CraneParameters, seed: str) -> list[tuple[float, float]]:
 
 def learn(source: Source, set_up: SetUp) -> tuple[Known, ...]:
     """Measure what practice teaches of a crane: press and release each joystick once.
+
+    Returns:
+        What is known of slew, in rad where ``Known`` says m, and of near-far.
 
     Raises:
         CampaignError: the crane has no slew or no near-far axis, has a rope, or does not move.
@@ -207,9 +227,10 @@ def do_work(
 
 
 def _seen(crane: Crane, radius_m: float) -> tuple[list[tuple[float, float]], float, float]:
-    """Tip and load, slewing in m there, and in degrees the tilt now and that of the next turn.
+    """Return (tip, load from the tip) of slew and near-far, m; then tilt and swing, degrees.
 
-    A lean in the wind is none.
+    Slew is the way along the arc at ``radius_m``; swing is the largest tilt that follows without
+    motion of the tip. A lean in the wind is neither.
     """
     state, grapple, (across, along) = crane.state, crane.parameters.grapple, crane.rest_rad
     tilt = state.theta5_rad - across, state.theta6_rad - along

@@ -82,8 +82,6 @@ def practised(
     """Let each operator practise with each set-up; return works with the fastest techniques.
 
     Args:
-        source: the deployment.
-        set_ups: the set-ups to practise with.
         people: skills by operator.
         within: tolerance: tip from the target, m, and swing, degrees.
         do: does the working cycles.
@@ -119,7 +117,7 @@ def do_all(
     works: Sequence[Work],
     done: Done | None = None,
 ) -> Done:
-    """Do all works and return them in this order; ``done`` gets each work when it is done."""
+    """Do all works; return them in this order. ``done`` gets each when it is done, in any order."""
     done = {} if done is None else done
     for work, moves in engine.run(partial(do_work, source), works):
         done[work] = moves
@@ -139,10 +137,6 @@ def at_work(
     """Practise for one cycle and do each task, with each set-up.
 
     Args:
-        engine: does the works.
-        source: the deployment.
-        set_ups: the set-ups to compare.
-        tasks: tasks by name.
         progress: called with the part that is done, 0 to 1, and the name of the work.
         seeds: number of working cycles of each task with each set-up.
 
@@ -221,7 +215,7 @@ def _seconds(moves: Sequence[Move], load: str | None = None) -> float:
 
 
 def gain(raw: Sequence[float], shaped: Sequence[float]) -> tuple[float, float, float]:
-    """Return the change of the mean, %, and its bounds by the bootstrap over pairs."""
+    """Return (change of the mean, its low and high 95 % bound), %, by the bootstrap over pairs."""
 
     def change(a: Any, b: Any, axis: int = -1) -> Any:
         return 100.0 * (np.mean(b, axis) / np.mean(a, axis) - 1.0)

@@ -64,7 +64,7 @@ class PlantPort:
         self._time_s = 0.0
 
     def begin(self, time_ms: int, frames: Sequence[Frame]) -> None:
-        """Begin a tick; these joystick frames wait behind the frames of the plant."""
+        """Begin a tick; these joystick frames wait, unfiltered, behind the frames of the plant."""
         self.arrived_ns, self._time_s = time_ms * 1_000_000, time_ms / 1000.0
         self._report(frames, self._time_s)
         self._waiting += frames
@@ -92,7 +92,7 @@ class PlantPort:
         return iter(())
 
     def send(self, frame: Frame) -> bool:
-        """Send a frame to the plant; drop one that may not be sent, as a listen-only port does."""
+        """Send a frame to the plant, or drop one that may not be sent; always return True."""
         if self._sends is not None and frame[:3] not in self._sends:
             return True
         self._plant.receive(frame)
@@ -105,9 +105,7 @@ class LockStep:
     """A controller and a plant, tick by tick, through the I/O cycle of the daemon.
 
     Args:
-        deployment: the machine.
         processor: the controller behind its gate, or a drive around that.
-        plant: the crane.
         joysticks: the sources of joystick frames.
         on_frame: called with every frame and its time in s; None if nobody listens.
         received: see ``PlantPort``.
@@ -164,7 +162,7 @@ class DriveOptions(TypedDict, total=False):
         prepare: called with the new controller before the drive, to replace its filter.
         crane: name of the crane that moves, if the deployment has several; the others stand still.
         disturb: returns a source of frames that disturbs those of the joysticks.
-        unit: file of an FMU in place of our crane.
+        unit: file of an FMU in place of our crane; raises DesignError where it is none.
     """
 
     bypass: bool
@@ -248,7 +246,7 @@ class Simulation:
         """Drive the script.
 
         Yields:
-            The time of each tick in ms, once the crane has moved until the next tick.
+            The time of each tick in ms, once the crane has moved; then its events are dropped.
         """
         lock_step, loads = self._lock_step, self._loads
         while (time_ms := lock_step.time_ms) < self._end_ms:
@@ -271,7 +269,7 @@ def drive(
     Args:
         deployment: the machine; its buses are not opened.
         script: the strokes of the operator.
-        on_progress: called once for each simulated second, with the simulated time in s.
+        on_progress: called at each tick on a whole simulated second, with that time in s.
         on_frame: called with every frame and its time in s.
         options: see ``DriveOptions``.
 

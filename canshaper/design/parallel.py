@@ -123,7 +123,8 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
     """Give a function that returns whether Ctrl-C came; Ctrl-C then raises no exception.
 
     An exception within the pool's own lines would leave a lock taken, for which the end of the pool
-    then waits for ever. Only the main thread gets Ctrl-C, and no background job of a shell does.
+    then waits for ever. Outside the main thread, and where Ctrl-C is ignored or has a handler, as
+    in a background job of a shell, the function always returns False.
     """
     seen = []
     before = signal.getsignal(signal.SIGINT)
@@ -138,11 +139,7 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
 
 
 def _begin(parent: int) -> None:
-    """Set up a process of the pool.
-
-    Args:
-        parent: number of the process that started it.
-    """
+    """Set up a process of the pool, and end it if the process ``parent`` has ended already."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
     end_with_parent(signal.SIGKILL)  # the parent may have no time to end it
     # Not by the pipe of multiprocessing: a sibling that was forked later holds its other end too.

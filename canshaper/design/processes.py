@@ -37,13 +37,10 @@ main()
 
 
 def end_with_parent(how: signal.Signals) -> None:
-    """Have the kernel send this process a signal when its parent ends (prctl(2)).
+    """Have the kernel send this process the signal ``how`` when its parent ends (prctl(2)).
 
     The kernel does not signal a parent that ended before the call: the caller checks for it
     afterwards. On systems other than Linux the function does nothing.
-
-    Args:
-        how: the signal.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, how)
@@ -71,7 +68,7 @@ LISTEN_STEP_S = 0.1
 
 @dataclass(frozen=True)
 class Transport:
-    """The bus that connects the processes, as options of python-can."""
+    """The bus that connects the processes, as options of python-can, and in words for the user."""
 
     interface: str
     channel: str
@@ -87,7 +84,9 @@ class BusDrive:
 
 
 def choose_transport(request: str, deployment: Deployment) -> Transport:
-    """Return SocketCAN if its channel opens, otherwise multicast; ``request`` may name one.
+    """Return the transport for a request: a SocketCAN channel, "udp_multicast" or "auto".
+
+    "auto" takes vcan0 if it opens, otherwise multicast.
 
     Raises:
         DriveError: the deployment has several buses or cranes, or the requested transport does not
@@ -136,15 +135,14 @@ def drive_on_bus(
     """Drive a script with three processes; record the frames received on the bus.
 
     Args:
-        deployment: the machine.
-        transport: the bus that connects the processes.
         script: the strokes of the operator.
         changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
         bypass: drive with anti-sway switched off.
         on_progress: called with the driven time in s.
-        on_frame: called with every frame and its time in s.
+        on_frame: called with every frame from the operator's start on, and its monotonic time in s.
 
     Raises:
+        BusError: the transport does not open.
         DriveError: a process ended early or does not answer.
     """
     recorder = Recorder(deployment, changed_parameters(changes, deployment))

@@ -70,7 +70,7 @@ def choosing(name: str) -> Callable[[Controller], None]:
 
 
 def figures(deployment: Deployment, crane: CraneParameters) -> Iterator[Figures]:
-    """Yield the measures of every profile on every axis that has it, and of the axis' own filter.
+    """Yield the measures of the own filter and of each profile, for each axis that has profiles.
 
     Raises:
         DesignError: the deployment has no profiles.

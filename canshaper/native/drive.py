@@ -64,7 +64,7 @@ class Driven(Protocol):
     """A controller in any language."""
 
     def stalled(self) -> None:
-        """Note that the loop stood still."""
+        """Note that the loop stood still: no input is trusted until it comes again."""
 
     def send_failed(self, frame: Frame, /) -> None:
         """Note that a valve frame could not be sent."""
@@ -73,7 +73,7 @@ class Driven(Protocol):
         """Take a received frame."""
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]:
-        """Return the frames to send now."""
+        """Return the frames to send now; ``missed`` ticks were left out before."""
 
 
 def play(tick: Tick, controller: Driven) -> list[Frame]:
@@ -88,18 +88,12 @@ def play(tick: Tick, controller: Driven) -> list[Frame]:
 
 
 def valve_keys(deployment: Deployment) -> list[MessageKey]:
-    """Return bus and id of each valve message, in the order of the axes."""
+    """Return (bus, id, extended) of each valve message once, in the order of the axes."""
     return list(dict.fromkeys(axis.valve.message.key for axis in deployment.axes.values()))
 
 
 def random_drive(deployment: Deployment, seed: str, ticks: int) -> Iterator[Tick]:
-    """Yield the ticks of a drive.
-
-    Args:
-        deployment: the machine.
-        seed: seed of the drive.
-        ticks: number of ticks.
-    """
+    """Yield so many ticks of a drive, which is the same for the same seed."""
     source = random.Random(seed)
     tick_ns = deployment.config.tick_ms * 1_000_000
     hands = {
@@ -225,7 +219,7 @@ MOST_TICKS = 1_000_000_000
 
 
 def rows(controller: Controller) -> list[list[float]]:
-    """Return one row for each axis, then one for each motion."""
+    """Return a row of inner state for each axis, by ``NAMES``, then a row for each motion."""
     return [*map(_axis_row, controller.axes.values()), *map(_motion_row, controller.motions)]
 
 

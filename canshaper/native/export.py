@@ -40,7 +40,7 @@ class Golden:
     Attributes:
         ticks: the drive.
         sent: valve frames, by tick.
-        rows: inner states after every ``EVERY``-th tick.
+        rows: rows of inner state (``drive.rows``) after the first tick and each ``EVERY``-th then.
         seen: pairs of state and reason that an axis had.
     """
 
@@ -84,7 +84,7 @@ def _driven(ticks: list[Tick], controller: Driven, state: Callable[[], list[Row]
 
 
 def golden_source(deployment: Deployment, golden: Golden, *, single: bool) -> str:
-    """Return ``cs_golden.c``; ``single``: in float."""
+    """Return ``cs_golden.c``; ``single``: in float, without probes of atan2."""
     buses, valves = list(deployment.config.buses), valve_keys(deployment)
 
     def frame(one: Frame) -> str:

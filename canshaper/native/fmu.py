@@ -161,7 +161,7 @@ def controller_unit(deployment: Deployment) -> Unit:
 
 
 def write_fmu(unit: Unit, deployment: Deployment, out: Path) -> str:
-    """Write a unit into a folder.
+    """Write a unit into a new or empty folder, with a binary where a compiler works here.
 
     Returns:
         A line for the user: the platform of its binary, or why it has none.

@@ -143,7 +143,7 @@ def compiler() -> list[str]:
 
 
 def has_compiler() -> bool:
-    """Whether this machine has a C compiler."""
+    """Return whether this machine has a C compiler."""
     try:
         return bool(compiler())
     except NativeError:
@@ -268,7 +268,7 @@ class NativeController:
         )
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        """Run every axis that is due; return the valve frames to send."""
+        """Run every axis that is due after ``missed`` left-out ticks; return the valve frames."""
         now = ctypes.c_int64(now_ns)
         count = self._c.cs_tick(self._state, self._tables, now, missed, self._out)
         frames: Iterable[_CFrame] = self._out[:count]

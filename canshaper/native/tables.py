@@ -140,7 +140,7 @@ def _sections(place: Place, section: Any, pattern: Place) -> Iterator[tuple[Plac
 
 
 def _unreadable(place: Place, message: Message, names: Iterable[str | None]) -> Refusals:
-    """Yield why the C cannot read or write a message."""
+    """Yield why the C cannot read or write a message or these of its signals."""
     if is_j1939(message) or is_fd(message) or message.length > CLASSICAL_BYTES:
         text = "expected classical CAN without J1939 in an export"
         yield (*place, "message"), f"{text}, got {message.name}"

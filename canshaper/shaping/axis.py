@@ -45,7 +45,8 @@ class ShapedAxis:
         grid_steps: steps of the valve frame from zero to full command.
 
     Attributes:
-        demand: demand of the operator in the last tick, [-1, 1], times ``scale``.
+        demand: the operator's demand in the last tick, [-1, 1]: in ACTIVE within ``bounds`` and
+            times ``scale``, in BYPASS_ON as it is, in other states 0.
         output: output of the axis with its parts: one object, which every tick overwrites.
         sway: the sway model.
         sensed: the sway sensor's observer and trust, or None without a sensor.
@@ -100,7 +101,7 @@ class ShapedAxis:
         return self.states.state not in MOVING
 
     def tick(self, joystick: CommandInput, added: float = 0.0) -> Transition | None:
-        """Run a whole tick: ``command`` and ``propagate``."""
+        """Run a whole tick, ``command`` and ``propagate``; return as ``command`` does."""
         transition = self.command(joystick, added)
         self.propagate()
         return transition
@@ -167,7 +168,7 @@ class ShapedAxis:
         return None if state is old else Transition(old, state, states.reason)
 
     def propagate(self) -> None:
-        """Let the sway model swing with the output of ``command``."""
+        """Let the sway model, and the sensor's observer, swing with the output of ``command``."""
         output = self.output
         if self.sway is not None:
             self.sway.step(output.applied)
@@ -175,10 +176,10 @@ class ShapedAxis:
             self.sensed.step(output.applied, self.demand, output.path)
 
     def hold(self, ticks: int) -> Transition | None:
-        """Count missed ticks, in which the valve kept the last output; return as ``command`` does.
+        """Count missed ticks, in which the valve kept the last output; return a trip, or None.
 
         Missed ticks lengthen neither the run-on nor a stop, and the filter takes the last demand in
-        each of them. Only the ramp does not catch up.
+        each of them, up to ``MOST_HELD``. Only the ramp does not catch up.
         """
         demand, output, time = self._clamped_demand(), self.output, self.added_time
         self.states.hold(ticks)
@@ -195,7 +196,7 @@ class ShapedAxis:
     def retune(
         self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper], past: Sequence[float] = ()
     ) -> None:
-        """Change sway data and filter, in motion too, without a jump of the output.
+        """Change sway mode and filter, which ``shaper_for`` makes, in motion too, without a jump.
 
         The model keeps the physical swing. The difference between both filters at this moment fades
         with ``transfer.BLEND_S``. With ``past`` (``applied`` in each tick since the axis was at
@@ -219,7 +220,7 @@ class ShapedAxis:
             self.sensed.retune(sway)
 
     def prepare(self, least: float, most: float) -> None:
-        """Prepare the filter, which has not run, for ``follow`` with factors from least to most."""
+        """Prepare the filter, which has not run, for factors of ``follow`` from least to most."""
         self.transfer.prepare(least, most)
 
     def follow(self, mode: SwayMode, factor: float) -> None:
@@ -229,7 +230,7 @@ class ShapedAxis:
         self.transfer.follow(factor)
 
     def allow_added(self, largest: float, time_s: float) -> None:
-        """Let a motion of two axes move this one while no one commands it, within both limits."""
+        """Let a motion move this axis uncommanded, at most by ``largest`` and for ``time_s``."""
         self.stage.largest_added = largest
         self.added_time = AddedTime(round(time_s / self.tick_s), self.stage.tail)
 
@@ -242,7 +243,7 @@ class ShapedAxis:
         self.states.restore(state, reason)
 
     def limit(self, limits: OutputLimits) -> None:
-        """Change maximum and rates, but not the tail.
+        """Use other limits from now on; the tail stays as it was.
 
         Raises:
             ValueError: the axis moves, and could become faster without its operator.
@@ -267,11 +268,10 @@ class ShapedAxis:
         return within(self.demand, -self.stage.limits.maximum, self.stage.limits.maximum, 0.0)
 
     def invalidate(self, old: State, error: Exception) -> Transition | None:
-        """Trip for an error of the filter, or an output that no frame carries.
+        """Trip for an error of the filter, or of the output; return the change from ``old``.
 
-        The model starts again: its state may be spoilt too.
-
-        In TRIPPED the first reason stays, and the first error is reported, not one in each tick.
+        The model starts again: its state may be spoilt too. In TRIPPED the first reason stays; the
+        first error is returned, then None in each tick.
         """
         if self.states.state is not TRIPPED:
             self.states.trip(Reason.OUTPUT_INVALID)

@@ -31,8 +31,8 @@ class EndStops:
     """Positions at which an axis has to stop.
 
     Attributes:
-        lowest, highest: lowest and highest position of the axis.
-        full_speed: change of the position per second at full positive command; not 0.
+        lowest, highest: lowest and highest position of the axis, in the unit of its signal.
+        full_speed: change of the position per second at full positive command, either sign, not 0.
         lag_s: seconds for which the axis goes on with the velocity that was sent last: lag of the
             valve, and age of the position.
     """
@@ -55,7 +55,7 @@ class EndStops:
             run_on: ``RunOn.travel`` of the filter.
 
         Returns:
-            (negative or 0, positive or 0).
+            (to the negative side: negative or 0, to the positive side: positive or 0).
         """
         one = (self.lowest - position) / self.full_speed
         other = (self.highest - position) / self.full_speed
@@ -73,7 +73,7 @@ class RunOn:
 
     Args:
         shaper: a fresh filter, of which this object uses up the state.
-        sway: sway model of the filter.
+        sway: sway model of the filter, also used up; None without one.
         tick_s: time between two demands, seconds.
         tail_s: longest run-on, seconds.
     """
@@ -139,7 +139,7 @@ class FlowBudget:
     """Finds the factor of all demands that the pump's flow allows, tick by tick.
 
     Args:
-        shares: flow of each axis at full speed, full axis flows.
+        shares: flow of each axis at full speed, in flows of one usual axis (full axis flows).
         tick_s: time between two calls of ``step``, seconds.
 
     Attributes:

@@ -109,7 +109,7 @@ class FreeSwing:
         self.angle = self.rate = self.offset = 0.0
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Advance a tick; ``by`` is the change of an undriven swing, as of ``swing_over``."""
+        """Advance a tick; ``by`` is an undriven swing's change in it, see ``swing_over``."""
         angle, rate = self.angle, self.rate
         self.angle = angle + by[0] * angle + by[1] * rate
         self.rate = rate + by[2] * angle + by[3] * rate
@@ -131,7 +131,7 @@ class FreeSwing:
         return error * (1.0 - offset - (rate if self._rates else angle))
 
     def begin(self, unexplained: float) -> None:
-        """Start from the first measurement."""
+        """Begin angle, rate and gains with this measurement, as of ``error``; keep the offset."""
         self.angle = self.rate = 0.0
         self._gains = iter(self._first)
         self.correct(self.error(unexplained))
@@ -161,16 +161,16 @@ class TwoFreeSwings(FreeSwing):
         self._second = FreeSwing(measured, [(0.0, 0.0, 0.0)])
 
     def step(self, by: tuple[float, float, float, float]) -> None:
-        """Advance a tick."""
+        """Advance both modes a tick; ``by`` is the change of the first one."""
         super().step(by)
         self._second.step(self._by)
 
     def error(self, unexplained: float) -> float:
-        """Return the error as ``FreeSwing.error`` does."""
+        """Return ``unexplained`` less the free swing of both modes and the offset."""
         return self._second.error(super().error(unexplained))
 
     def correct(self, error: float) -> float:
-        """Correct as ``FreeSwing.correct`` does."""
+        """Correct both modes and the offset, and return the error that is left."""
         angle, rate = next(self._gains_of_second, self._first_of_second[-1])
         second = self._second
         second.angle += angle * error
@@ -178,7 +178,7 @@ class TwoFreeSwings(FreeSwing):
         return super().correct(error) - error * (rate if self._rates else angle)
 
     def begin(self, unexplained: float) -> None:
-        """Start from the first measurement."""
+        """Begin both modes again as ``FreeSwing.begin`` does; keep the offset."""
         self._second.angle = self._second.rate = 0.0
         self._gains_of_second = iter(self._first_of_second)
         super().begin(unexplained)
@@ -190,12 +190,7 @@ def observer_gains(
     """Return the Kalman gains of the first measurements, the steady state's last.
 
     Each has the gains of angle, rate and offset, then of angle and rate of any second mode.
-
-    Args:
-        mode: sway mode of the axis.
-        tick_s: time between two measurements, seconds.
-        timing: timing of the sensor.
-        limits: bounds of its measurements.
+    ``tick_s`` is the time between two measurements.
     """
     swing, ticks, offset = swing_over(mode, tick_s), tick_s / TICK_OF_NOISE_S, limits.offset
     rates, second = timing.measured is Measured.RATE, limits.second
@@ -220,14 +215,7 @@ def observer_gains(
 def sensor_gains(
     mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
 ) -> SensorGains:
-    """Return the gains of a sensor on an axis.
-
-    Args:
-        mode: sway mode of the axis.
-        tick_s: period of the axis, seconds.
-        timing: timing of the sensor.
-        limits: bounds of its measurements.
-    """
+    """Return the gains of a sensor on an axis, whose period is ``tick_s``."""
     period_s = max(1, round(timing.period_s / tick_s)) * tick_s
     one = observer_gains(mode, period_s, timing, replace(limits, second=None))
     two = observer_gains(mode, period_s, timing, limits) if limits.second else ()

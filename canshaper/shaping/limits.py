@@ -19,7 +19,7 @@ class ValveCurve:
 
     Args:
         commands: commands, rising from -1 to 1.
-        speeds: speed at each command as a part of full, rising; zero at two neighbouring points,
+        speeds: speed at each command, rising, 1 or -1 at the faster end; zero at two neighbours,
             the ends of the dead band, of which the first is at a command up to 0 and the second
             from 0 on.
 
@@ -48,7 +48,7 @@ class ValveCurve:
         return _between(velocity, speeds, commands, bisect_right(speeds, velocity))
 
     def velocity(self, command: float) -> float:
-        """Velocity that a command gives; zero within the dead band."""
+        """Return the velocity that a command gives; zero within the dead band."""
         speeds, commands = self.speeds, self.commands
         if command >= commands[-1]:
             return speeds[-1]
@@ -123,7 +123,7 @@ class OutputLimits:
 
 
 class RecentDemand:
-    """Largest and smallest command of the last ``ticks`` ticks, zero included (sliding window).
+    """Largest and smallest command of this tick and the ``ticks`` before it, zero included.
 
     Amortised constant time: two monotonic queues, of positive and of negative commands.
     """
@@ -145,7 +145,7 @@ class RecentDemand:
         self.low = self.high = 0.0
 
     def clear_against(self, held: float) -> None:
-        """Invalidate the commands of the other direction."""
+        """Invalidate the commands against the sign of ``held``, which is not 0."""
         if held > 0.0:
             self._smallest.clear()
             self.low = 0.0
@@ -183,12 +183,12 @@ class RecentDemand:
 def allowed_range(
     recent_low: float, recent_high: float, limits: OutputLimits
 ) -> tuple[float, float]:
-    """Return the range that the operator allows: never faster than demanded in that direction.
+    """Return the range of the output: as fast as demanded within the tail, or faster if allowed.
 
     Args:
         recent_low: smallest command within the tail, 0 or negative.
         recent_high: largest command within the tail, 0 or positive.
-        limits: the axis' limits.
+        limits: the axis' limits: ``maximum``, ``allow_faster`` and ``allow_reverse``.
 
     Returns:
         (low, high) with low <= 0 <= high.
@@ -262,12 +262,12 @@ def on_grid(
     *,
     curve: ValveCurve | None = None,
 ) -> tuple[int, float]:
-    """Round a velocity to a step that the frame can carry.
+    """Round a velocity to a step of the frame, or towards zero where a bound is in the way.
 
     Args:
         velocity: limited velocity, [-1, 1].
-        low: lower bound that rounding must not pass.
-        high: upper bound that rounding must not pass.
+        low: lower bound that rounding must not pass, except to zero.
+        high: upper bound, as ``low``.
         deadband: deadband to add, fraction of full command.
         steps: raw steps of the frame from zero to full command.
         curve: curve of the measured valve, instead of the deadband.

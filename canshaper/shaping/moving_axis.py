@@ -26,7 +26,7 @@ class MovingAxis:
         commanded: whether the operator demanded motion within the tail.
         unattended: whether its joystick rested for longer than the tail, see ``AddedTime``.
         able: whether the axis may carry out an added velocity.
-        room_m: how far the axis may still move each way ahead of its end stops, rad or m.
+        room_m: how far the axis may still move ahead of its end stops, rad or m: (back, ahead).
         added: velocity to add now, [-1, 1]; a result.
         sent: velocity that its valve got last, [-1, 1].
         farthest: how far the axis may be moved from where its operator left it, rad or m; see
@@ -76,7 +76,7 @@ class MovingAxis:
         self.lag_s = 2.0 * ratio / omega
 
     def held(self, seconds: float) -> None:
-        """Add the way of the seconds in which the last output was held."""
+        """Add to ``reached`` the way of ``added`` in seconds without a step."""
         self.reached += self.added * self.full_speed * seconds
 
     def path(self, after_s: float) -> GrapplePath:
@@ -93,7 +93,7 @@ class MovingAxis:
         return full * angle, full * rate, full * (applied - rate), full * pull
 
     def room(self, sign: float) -> float:
-        """Return the largest velocity in a direction from which it stops before ``farthest``."""
+        """Return the largest |velocity| towards ``sign`` (1, -1) that stops before ``farthest``."""
         way = (self.farthest - sign * self.way) / self.full_speed
         if not way > 0.0:
             return 0.0
@@ -103,6 +103,8 @@ class MovingAxis:
 
     def add(self, target: float, weight: float) -> None:
         """Set ``added`` so that the added position reaches a target at the end of the period.
+
+        End stops, ``farthest``, ``MOST_STEP`` and full speed bound it; next to nothing becomes 0.
 
         Args:
             target: target of the added position, rad or m.

@@ -123,7 +123,7 @@ class LateModel:
 
 
 Errors = tuple[float, float, float, float]
-"""Errors of a measurement, rad or rad/s, one for each hypothesis of what the sensor shows."""
+"""Errors of a measurement, rad or rad/s: (free, negated, alone, dragged) of ``SwayObserver``."""
 
 
 class SwayObserver:
@@ -232,7 +232,7 @@ class SwayObserver:
         return self.free.correct(errors[0])
 
     def own(self, scale: float) -> float:
-        """Return the measurement that own motion alone would give."""
+        """Return the measurement that own motion alone would give; ``scale`` as of ``errors``."""
         return scale * (self.late.rate if self._rates else self.late.angle)
 
     def step(self, velocity: float, added: float) -> None:

@@ -123,7 +123,7 @@ class OutputStage:
         *,
         sensor_damps: bool,
     ) -> None:
-        """Find the output of one tick of a moving axis.
+        """Find the output of one tick of a moving axis, and put it into ``output``.
 
         Args:
             held: velocity at which the operator holds the joystick.
@@ -134,7 +134,7 @@ class OutputStage:
                 more than the one movement of a small stroke.
 
         Raises:
-            ValueError: the reference is no number, or the added velocity is no velocity.
+            ValueError: the reference is not finite, or the added velocity is no velocity.
         """
         limits, recent, output = self.limits, self._recent, self.output
         added = path + damping
@@ -233,7 +233,7 @@ class OutputStage:
         return over
 
     def _beyond(self, held: float) -> float:
-        """Excess over the demand: of the own part, or of all (see gate) less what may be added."""
+        """Return how far own ramp, or setpoint less ``largest_added``, exceeds ``held``; or 0."""
         own, sent = self._own_ramp, self.output.setpoint
         own_asked, asked = held if own > 0.0 else -held, held if sent > 0.0 else -held
         own_beyond = abs(own) - max(own_asked, 0.0)
@@ -247,7 +247,7 @@ class OutputStage:
         self._carry = 0.0
 
     def stop_against(self, held: float) -> None:
-        """End the run-on of a stop held against, by the fall, or after the time of a reversal."""
+        """In a stop, end a run-on against the joystick ``held``: now, or after ``reversal``."""
         if held * self._side < 0.0:
             self._side, self._crossed = -self._side, 0
         if not self.reversal and held * self.ramp < 0.0:
@@ -273,7 +273,7 @@ class OutputStage:
         self._no_run_on -= 1
 
     def hold(self, demand: float, ticks: int) -> None:
-        """Count missed ticks, in which the demand held and the valve kept its output."""
+        """Count missed ticks, in which this demand stayed and the valve kept its output."""
         self._recent.age(ticks)
         self._demanded.age(ticks)
         self._no_run_on -= ticks
@@ -282,7 +282,7 @@ class OutputStage:
         self.small.hold(demand, self.output.applied, ticks)
 
     def change_limits(self, limits: OutputLimits) -> None:
-        """Use other limits from now on, at rest. Demands within the tail still count."""
+        """Use other limits, with the old tail, from now on, at rest. Demands in it still count."""
         self.limits = limits
         self.rates = limits.rise_per_s * self._tick_s, limits.fall_per_s * self._tick_s
         fall_s = limits.maximum / limits.fall_per_s

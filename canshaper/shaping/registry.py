@@ -67,11 +67,12 @@ def build_shaper(
     Args:
         kind: name of the filter, one of ``KINDS``.
         tick_s: time between two ticks of the axis, seconds.
-        sway: sway model of the axis; the filter may keep it, its owner steps it.
+        sway: sway model of the axis, or None; the filter may keep it, its owner steps it.
         valve_rate_per_s: rate of the valve, full speeds per second, for filters that feed back.
         parameters: parameters of the filter, by their names in the deployment file.
 
     Raises:
+        KeyError: there is no such kind.
         ValueError: the parameters make no filter, or the filter needs sway data and has none.
 
     Returns:
@@ -118,7 +119,7 @@ class ParameterSet:
 
 
 def position(sets: Sequence[ParameterSet], value: float) -> int:
-    """Return the position of a value among rising sets, in steps, clamped to the ends."""
+    """Return a value's position among rising sets, ``STEPS_BETWEEN`` from set to set, clamped."""
     values = [one.at for one in sets]
     if value <= values[0]:
         return 0
@@ -130,10 +131,10 @@ def position(sets: Sequence[ParameterSet], value: float) -> int:
 
 
 def at_position(sets: Sequence[ParameterSet], steps: int) -> ParameterSet:
-    """Return the set at a position, interpolated between two sets.
+    """Return the set at ``steps``, a result of ``position``, interpolated between two sets.
 
     Period, damping ratio, poles, taps and every other number are interpolated linearly; so poles
-    stay real and negative, and taps keep the sum 1.
+    stay real and negative, and taps keep the sum 1. Whole numbers are rounded.
     """
     low, part = divmod(steps, STEPS_BETWEEN)
     if not part:

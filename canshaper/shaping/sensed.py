@@ -92,8 +92,8 @@ class SensedSway:
         Args:
             value: a new measurement, rad or rad/s, with the sign of the model; None without one.
             scale: rad per normalised angle of the model.
-            commanded: whether the operator demanded motion within the tail. Else nothing is fed
-                back to the valve, and swing that another axis makes proves nothing of the sensor.
+            commanded: whether the operator demanded motion within the tail. Else the valve damps
+                only where ``damps``, and swing of another axis proves nothing, but see ``other``.
             damps: whether the axis damps a swing that another axis makes.
             other: measurement that the other axis' sensor would show by that axis' own motion.
                 With it such a swing proves a sensor that has had no fault, see ``CrossedSway``.
@@ -140,13 +140,13 @@ class SensedSway:
             self._observer.swing(self._fading)
 
     def retune(self, sway: SwayModel) -> None:
-        """Continue with another model of the axis."""
+        """Continue with another model of the axis; trust and weight stay."""
         self._sway = sway
         self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
         self._observer.retune(sway)
 
     def restart(self) -> None:
-        """Restart because the model restarts and does not know its swing; feed nothing back."""
+        """Feed nothing back until proved again: the model restarts and does not know its swing."""
         self._observer.restart()
         self.weight = 0.0
         self._sway.free_angle = self._sway.free_rate = 0.0
@@ -190,7 +190,7 @@ class SensedSway:
                 self.state = Trust.TRUSTED
 
     def _refuted(self, value: float, other: float | None, error: float) -> bool:
-        """Return whether the sensor is shown not to measure the other axis; see ``CrossedSway``."""
+        """Return whether ``CrossedSway`` refutes that it measures ``other``; True where None."""
         if other is None:
             if self._crossed and self.state is not Trust.TRUSTED:
                 self._evidence.clear()  # that is no proof without the other axis
@@ -210,7 +210,7 @@ class SensedSway:
         self.length.add(value, offset, speed_m_s, pressed=commanded, free=free)
 
     def _doubt(self, why: Trust, *, again: bool = False) -> None:
-        """Distrust the sensor for a reason; ``again``: the observer has to begin again."""
+        """Distrust the sensor, where no older fault stays; ``again``: the observer begins again."""
         if self.state is Trust.TRUSTED:
             self._needed = PROVED_AGAIN
             self._evidence.clear()

@@ -13,7 +13,7 @@ import math
 from canshaper.shaping.limits import OutputLimits
 
 # Strokes are small if the least step makes all of them within this time, s. With steps of 1/125
-# that is 0.6 s of full speed. Larger strokes are not made of single steps.
+# that is 0.4 to 0.9 s of full speed, by the deadband. Larger ones are not made of single steps.
 SMALL_S = 90.0
 # Ticks at the least step that may be left over: one more step would travel too far by as much.
 LEFT = 0.5
@@ -82,7 +82,7 @@ class SmallStrokes:
         return self._forth(target, due, high)
 
     def _forth(self, target: float, due: float, most: float) -> float:
-        """Return the velocity of a small stroke in positive direction."""
+        """Return the velocity of a small positive stroke with the travel ``due``; 0 at its end."""
         least = self.least
         return max(min(least, most), min(target, due)) if due > LEFT * least else 0.0
 

@@ -129,7 +129,7 @@ class CommandInput(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One change of state.
+    """One change of state, or the first error of a filter in TRIPPED.
 
     Attributes:
         old: the state before.

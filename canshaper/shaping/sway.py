@@ -27,7 +27,7 @@ def _require(name: str, value: float, low: float, high: float, unit: str) -> flo
 
 
 def _omega_rad_s(period_s: float, damping_ratio: float) -> float:
-    """Undamped natural frequency of a swing with this damped period."""
+    """Return the undamped natural frequency of a swing with this damped period."""
     return 2.0 * math.pi / (period_s * math.sqrt(1.0 - damping_ratio**2))
 
 
@@ -37,7 +37,7 @@ class SwayMode:
 
     Attributes:
         omega_rad_s: undamped natural frequency, 0.25 to 50 rad/s (length about 157 m to 4 mm).
-        damping_ratio: 0 (swings for ever) to below 1.
+        damping_ratio: 0 (swings for ever) to 0.95.
 
     Raises:
         ValueError: a value is outside its range; the message names value and range.
@@ -61,7 +61,7 @@ class SwayMode:
 
     @classmethod
     def from_length(cls, length_m: float, damping_ratio: float) -> Self:
-        """Mode of a load on a rope: omega^2 = g/l."""
+        """Return the mode of a load on a rope: omega^2 = g/l."""
         _require("pendulum length", length_m, 0.05, 150.0, "m")
         return cls(math.sqrt(GRAVITY_M_S2 / length_m), damping_ratio)
 
@@ -242,7 +242,7 @@ class SensorTiming:
         delay_s: age of a measurement when it is received, seconds.
         lag_s: time constant from the sent velocity to the speed of the tip, seconds.
         lost_s: time without a measurement after which the sensor is lost, seconds.
-        quickness: process noise of the rate over a tick, against a measurement noise of 1.
+        quickness: process noise of the rate over 20 ms, against a measurement noise of 1.
     """
 
     measured: Measured

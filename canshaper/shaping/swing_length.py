@@ -116,7 +116,7 @@ class SwingLengthEstimate:
     def add(
         self, value: float, offset: float, speed_m_s: float, *, pressed: bool, free: bool
     ) -> None:
-        """Take a measurement.
+        """Take a measurement; a window that gives a length puts it into ``result``.
 
         Args:
             value: measurement, rad or rad/s.
@@ -159,7 +159,7 @@ class SwingLengthEstimate:
         sums[5] += bend * bend
 
     def _solved(self) -> SwingLength | None:
-        """Solve bend = drive / length + damping drag by least squares, damping near the file's."""
+        """Solve bend = drive / length + damping drag, damping near the file's; None if unsure."""
         aa, ab, bb, ax, bx, xx = self._sums
         weight = DAMPING_WEIGHT * bb
         determinant = aa * (bb + weight) - ab * ab

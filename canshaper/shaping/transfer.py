@@ -88,7 +88,7 @@ class BumplessTransfer:
         self.shaper.step(demand)
 
     def prepare(self, least: float, most: float) -> None:
-        """Prepare the filter for ``follow`` from least to most."""
+        """Prepare the filter, which has not run, for factors of ``follow`` from least to most."""
         assert isinstance(self.shaper, Following)  # checked with the deployment
         self.shaper.prepare(least, most)
 

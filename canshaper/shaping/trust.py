@@ -84,7 +84,7 @@ class Evidence:
 
     @property
     def surprise(self) -> float:
-        """Root mean square of the last errors under the hypothesis of this axis and sign."""
+        """Root mean square of the last errors if the sensor shows this axis, rad or rad/s."""
         return math.sqrt(self._energies[0])
 
     def _added(self, ratio: float, other: float, known: float) -> float:
@@ -105,7 +105,7 @@ class Evidence:
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:
-        """Return the fault whose hypothesis wins by a ratio below ``least``, or None."""
+        """Return WRONG_SIGN or CONTACT, by the lowest ratio, if it is below ``least``, or None."""
         contact = min(self.own, self.free)
         if min(self.sign, contact) >= least:
             return None
@@ -144,7 +144,7 @@ class CrossedSway:
         self._evidence = Evidence(timing.measured, noise, timing.period_s)
 
     def refuted(self, value: float, other: float, error: float) -> bool:
-        """Take a measurement and its error under this axis; return whether both are refuted."""
+        """Take a measurement and its error by this axis; return whether both are refuted."""
         errors = self._same.error(value - other), self._negated.error(value + other)
         self._same.correct(errors[0])
         self._negated.correct(errors[1])
@@ -152,13 +152,13 @@ class CrossedSway:
         return self._evidence.proved(PROVED)
 
     def step(self, observer: SwayObserver) -> None:
-        """Advance a tick."""
+        """Advance the free swings of both hypotheses a tick, by the sway mode of ``observer``."""
         observer.swing(self._same)
         observer.swing(self._negated)
 
 
 def largest_jump(measured: Measured, noise: float, period_s: float) -> float:
-    """Return the largest jump of a measurement from its expected value, rad or rad/s."""
+    """Return the largest error of a measurement that is no jump, rad or rad/s."""
     jump = math.radians(JUMP_DEG_S if measured is Measured.RATE else JUMP_DEG)
     return jump * max(1.0, period_s / TICK_OF_NOISE_S) + JUMP_NOISE * noise
 
@@ -227,7 +227,7 @@ class Still:
         self._stays = False
 
     def check(self, value: float, bent: float) -> bool:
-        """Return whether the value was constant for too long; see ``Standstill.check``."""
+        """Return whether the value stays though a swing would change it; see ``Standstill``."""
         values, bends = self._values, self._bends
         values.append(value)
         bends.append(bent)
@@ -255,7 +255,7 @@ class Restlessness:
         self._commanded = Path(round(2.0 * RESTLESS_S / tick_s))
 
     def add(self, velocity: float, command: float) -> bool:
-        """Take velocity and command of a tick; return whether they differ too much."""
+        """Take velocity and command of a tick; return whether the velocity's path is too long."""
         moved = self._moved.add(velocity)
         return moved > RESTLESS_SHARE * self._commanded.add(command) + RESTLESS_MORE
 
@@ -270,7 +270,7 @@ class Path:
         self._last = self._length = 0.0
 
     def add(self, value: float) -> float:
-        """Take the next number."""
+        """Take the next number, and return the length."""
         step = abs(value - self._last)
         self._last = value
         self._length += step - self._steps[0]

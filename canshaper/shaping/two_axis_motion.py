@@ -88,7 +88,7 @@ class TwoAxisMotion:
         self.unattended = False
 
     def step(self, elapsed_s: float, tip_m: float | None, circle_m: float | None = None) -> None:
-        """Set ``added`` of each axis whose period begins now.
+        """Set ``added`` of each axis whose period begins now, and ``damps`` of near-far.
 
         Args:
             elapsed_s: time since the last step, seconds.
@@ -135,7 +135,7 @@ class TwoAxisMotion:
         near_far.add(path_m if way_m > path_m else max(way_m, -path_m), weight)
 
     def stop(self) -> None:
-        """Add nothing from now on, because one of the axes has tripped."""
+        """Add nothing, because an axis has tripped; ``step`` fades in again once all are able."""
         self._weight = 0.0
         self._rest()
 
@@ -175,7 +175,7 @@ class TwoAxisMotion:
         return -height_m * lead, -height_m * rate, -height_m * speed, -height_m * acceleration
 
     def _moved(self, near_far: MovingAxis, elapsed_s: float) -> None:
-        """Count how far near-far was moved, and let it damp only within that limit."""
+        """Count how far near-far was moved; let it damp only within ``path_m``, ``farthest``."""
         if near_far.commanded or self.unattended:
             near_far.damps, near_far.damped, near_far.way = False, 0.0, 0.0
             return
@@ -191,7 +191,7 @@ class TwoAxisMotion:
     def _carried_m(
         self, near_far: MovingAxis, elapsed_s: float, tip_m: float | None
     ) -> float | None:
-        """Return the grapple's radius: predicted by near-far's model, corrected by the tip's."""
+        """Return the grapple's radius by near-far's model, corrected by the tip's; None so far."""
         sway, full = near_far.sway, near_far.full_speed
         luffed_m, _, luffed_m_s, _ = self._luffed(self.luffing, 0.0) if self.luffing else _REST
         ahead_m = full * sway.angle + near_far.reached + luffed_m
@@ -257,7 +257,7 @@ def range_with_added(
     maximum: float,
     no_run_on: bool = False,
 ) -> tuple[float, float]:
-    """Range of an axis' own velocity and the added one together, up to ``maximum``.
+    """Return the range of an axis' own velocity and the added one together, up to ``maximum``.
 
     - Against a joystick that is held: no further than the own velocity already runs on.
     - In a direction that was commanded within the tail: no faster than commanded there.

@@ -31,7 +31,7 @@ class Candidate:
     Attributes:
         name: name of the filter in tables.
         filters: by axis, as they would stand in a deployment file.
-        ours: the filter is limit-aware, as G_FF and the robust shaper are.
+        ours: the filter is limit-aware, as G_FF and the robust shaper are, or the file's by load.
         motion: it runs with the two-axis motion, if the deployment has one.
         sensor: it runs with the sway sensors of the deployment.
         by_load: it is the file's own filter, with the sets of its gain schedules.
@@ -134,7 +134,10 @@ def _robust(
 
 
 def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
-    """Return the deployment with the candidate's filters, its sensors or none, and a long tail."""
+    """Return the deployment with the candidate's filters, its sensors or none, and a long tail.
+
+    The stopping distance is left out; motions and gain schedules too, where it runs without them.
+    """
     axes = dict(deployment.axes)
     for axis, its_filter in candidate.filters.items():
         config = axes[axis].config
@@ -207,7 +210,7 @@ class Manoeuvre:
 
 
 def manoeuvres() -> list[Manoeuvre]:
-    """Return all manoeuvres."""
+    """Return all manoeuvres, those of a single axis first."""
     single = [task for axis in AXES for task in _single(axis)]
     pulse = next(task for task in single if task.name == "pulse near-far")
     loading = SCRIPTS["loading"].strokes

@@ -45,8 +45,8 @@ class Outcome:
         swings_on: in a pulse: ``still_s`` is a lower bound, since the drive ended before.
         stop_s: in a pulse: run-on after release until the tip stays below 5 % of full speed.
         run_on_m: in a pulse: travel after release; for slew on the largest radius.
-        dip: in a pulse: largest fall of the command while the joystick is held.
-        re_rise: in a pulse: largest rise of the command after release.
+        dip: in a pulse: largest fall of the command while the joystick is held, part of full.
+        re_rise: in a pulse: largest rise of the command after release, part of full.
     """
 
     candidate: str
@@ -144,14 +144,12 @@ def measure_all(
     on_progress: Callable[[float], None],
     processes: int | None = None,
 ) -> list[Outcome]:
-    """Drive every candidate through every manoeuvre, on all processors.
+    """Drive every candidate through every manoeuvre; return the outcomes in this order.
 
     An interrupt ends it and its processes at once.
 
     Args:
         file: deployment file, loaded again in every process.
-        candidates: the filters to compare.
-        tasks: the manoeuvres.
         on_progress: called with the part done, 0 to 1.
         processes: number of processes; by default one for each processor.
     """

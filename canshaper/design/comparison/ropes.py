@@ -59,7 +59,7 @@ class RopeFilter:
     Attributes:
         name: name of the filter in the table.
         filters: by axis; empty for the filters of the file.
-        rope_m: fixed length that the filter is made for; None: it follows the rope.
+        rope_m: fixed length that the filter is made for, m; None: that of the file, or measured.
         bypass: drive with anti-sway off.
     """
 
@@ -96,7 +96,7 @@ def rope_filters(deployment: Deployment) -> list[RopeFilter]:
     """Return the filters to compare.
 
     Raises:
-        DesignError: the deployment lacks an axis that swings the load.
+        DesignError: the deployment lacks an axis that swings the load, or its sway data.
     """
     by_coordinate = deployment.by_coordinate
     kind = kind_of(by_coordinate)
@@ -232,7 +232,7 @@ Job = tuple[RopeFilter, Work]
 
 
 def left_deg(deployment: Deployment, job: Job) -> float:
-    """Return the largest swing that remains after a drive, degrees."""
+    """Drive the work of a job with its filter; return the largest swing after the dwell, deg."""
     (one, work), crane = job, changed_parameters([], deployment)
     strokes, rope_m = work.strokes, work.rope_m
     end_s = max(stroke.end_s for stroke in strokes) + dwell_s(deployment)
@@ -252,7 +252,7 @@ def left_deg(deployment: Deployment, job: Job) -> float:
 def compare_ropes(
     deployment: Deployment, on_progress: Callable[[float], None], processes: int | None = None
 ) -> dict[str, dict[str, float]]:
-    """Return the largest swing that each filter leaves, degrees: filter -> work -> swing."""
+    """Return filter -> name of the work -> the largest swing that the filter leaves, degrees."""
     jobs: list[Job] = [
         (one, work) for one in rope_filters(deployment) for work in works(deployment)
     ]

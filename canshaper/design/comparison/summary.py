@@ -72,7 +72,7 @@ class Row:
 
 
 def rows(compared: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
-    """Return one row for each candidate, in the order of the candidates."""
+    """Return one row for each candidate, in their order; ``outcomes`` include those of "off"."""
     raw = [o for o in outcomes if o.candidate == "off"]
     return [_row(c, [o for o in outcomes if o.candidate == c.name], raw) for c in compared]
 
@@ -141,11 +141,12 @@ def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, s
     """Return the filter to take by three priorities: its row, and a sentence with the reason.
 
     All three leave out filters that an operator feels dip (``FELT_DIP``); "off" never does. "fast"
-    stops soonest, "balanced" leaves least of those that stop in time, "calm" leaves least.
+    stops soonest of those that leave little (of all, if none does), "balanced" leaves least of
+    those that stop in time (of all, if none does), "calm" leaves least.
 
     Args:
         table: rows of the comparison, one of them "off".
-        period_s: period of the swing.
+        period_s: period of the swing of near-far.
     """
     off = next(r for r in table if r.name == "off")
     even = [r for r in table if r.dip <= FELT_DIP]
@@ -154,17 +155,19 @@ def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, s
     in_time = [r for r in even if r.stop_s <= BALANCED_PERIODS * period_s]
     balanced = min(in_time or even, key=lambda r: (r.worst_15_deg, r.stop_s))
     calm = min(even, key=lambda r: (r.worst_30_deg, r.stop_s))
+    little = ", of all that leave" if quiet else "; none leaves"
+    timely = " of all that stop" if in_time else "; none stops"
     return {
         "fast": (
             fast,
-            f"fast: {fast.name} stops soonest, {fast.stop_s:.1f} s after release, of all that leave"
+            f"fast: {fast.name} stops soonest, {fast.stop_s:.1f} s after release{little}"
             f" at most {100 * FAST_LEAVES:.0f} % of the unshaped swing at lengths within 15 %"
             f" ({fast.worst_15_deg:.1f} of {off.worst_15_deg:.1f} degrees)",
         ),
         "balanced": (
             balanced,
             f"balanced: {balanced.name} leaves least at lengths within 15 %"
-            f" ({balanced.worst_15_deg:.1f} degrees) of all that stop within"
+            f" ({balanced.worst_15_deg:.1f} degrees){timely} within"
             f" {BALANCED_PERIODS:g} of a swing ({balanced.stop_s:.1f} s)",
         ),
         "calm": (

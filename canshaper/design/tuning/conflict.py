@@ -34,7 +34,7 @@ def box_conflict(task: Task) -> None:
 
 
 def feasible_point(program: Program) -> Vector | None:
-    """Return poles that keep all requirements, as z, or None."""
+    """Return poles that keep all requirements, as z of ``Program``, or None."""
     limits = _limits(program.task)
 
     def violation(measures: dict[str, float]) -> float:

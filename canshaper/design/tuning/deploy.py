@@ -99,9 +99,9 @@ def from_parameters(
 def tail_for(
     setting: Setting, mode: SwayMode, tick_s: float, machine: Machine
 ) -> tuple[float, float] | None:
-    """Return the shortest ``tail_s`` that adds no residual sway, and the residual it leaves.
+    """Return the shortest ``tail_s`` that adds under 1 % of residual sway, and the part it leaves.
 
-    Return None if even the longest tail that a file may have is too short.
+    Return None if only the longest tail that is tried (``longest_tail_s``) does so.
     """
     shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
     longest_s = longest_tail_s(mode)
@@ -116,7 +116,7 @@ def tail_for(
 
 
 def recommendation(axis: str, setting: Setting, tail: tuple[float, float] | None) -> str:
-    """Return a plain sentence for a person, and a second one if the tail ends the run-on early."""
+    """Return a plain sentence for a person, and a second one where ``tail_for`` gave a ``tail``."""
     m = setting.measures
     third = f", third_pole_rad_s: {setting.third_pole_rad_s:g}" if setting.third_pole_rad_s else ""
     text = (
@@ -165,7 +165,7 @@ def _left(
 
 
 def table(setting: Setting, before: Setting | None, method: str) -> Table:
-    """Return a table of the setting beside that of the file; residuals: machine | filter alone."""
+    """Return a table of ``before``, the file's setting or None, and the setting by ``method``."""
     columns = [setting] if before is None else [before, setting]
     result = new_table("", *([] if before is None else ["in the file"]), method)
 

@@ -58,7 +58,7 @@ class Machine:
 
     @classmethod
     def of(cls, bound: BoundAxis) -> Self:
-        """Return the machine of an axis, with the values of its deployment."""
+        """Return the machine of an axis by its deployment; ``lag_s`` stays the default."""
         limits = bound.config.limits
         return cls(
             limits=limits.output_limits(),
@@ -77,7 +77,8 @@ class Residual:
         linear: |H(e^(pT))| of the filter alone, at the true sway pole p.
         machine: swing after a full press and after a full release, through the limits of the axis
             and a lagging valve, as a part of that without the filter; the worse of the two. The
-            swing without the filter counts as at least ``STILL`` of its largest value.
+            swing without the filter counts as at least ``STILL`` of its largest value. At least 1
+            where the press ends below half of the maximum: its first steps are rounded to none.
     """
 
     length_pct: float
@@ -185,7 +186,7 @@ def evaluate(
 
 
 def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[float]:
-    """Return the output for a unit step without limits, one value per tick, until it is still."""
+    """Return the unlimited output for a unit step, one value a tick, until still or 120 s long."""
     sway = SwayModel(mode, tick_s)
     shaper = shaper_for(sway)
     y: list[float] = []
@@ -252,7 +253,7 @@ def swing_left(
     machine: Machine,
     trues: Sequence[SwayMode],
 ) -> list[float]:
-    """Return ``Residual.machine`` for each true pendulum."""
+    """Return ``Residual.machine`` for each true pendulum, of a press held for 4 s."""
     shaped, raw = _moves(mode, tick_s, shaper_for, machine, _HELD_S)
     return [_worst(true, tick_s, machine, shaped, raw) for true in trues]
 

@@ -204,7 +204,8 @@ def lengths(range_pct: float, count: int) -> list[float]:
 def at_length(mode: SwayMode, factor: float) -> SwayMode:
     """Return the mode of the same joint and mass on a pendulum ``factor`` times as long.
 
-    w^2 ~ 1/l and, for a constant damping of the joint, 2 zeta w = c/(m l^2) ~ 1/l^2.
+    w^2 ~ 1/l and, for a constant damping of the joint, 2 zeta w = c/(m l^2) ~ 1/l^2; zeta stays
+    within 0.95.
     """
     return SwayMode(
         mode.omega_rad_s / math.sqrt(factor), min(0.95, mode.damping_ratio * factor**-1.5)

@@ -59,10 +59,8 @@ def second_mode(
 
     Args:
         first: nominal mode of the axis.
-        period_s: period of the second mode.
-        damping_ratio: damping ratio of the second mode.
+        period_s, damping_ratio: those of the second mode.
         range_pct: error of its pendulum length that the taps cover, +- percent.
-        tick_s: tick of the axis.
         rate_per_s: rate of the valve, full speeds per second.
 
     Raises:
@@ -106,6 +104,6 @@ def responses_of(
 def second_responses(
     second: SecondMode, tick_s: float, count: int, lengths: int = LENGTHS
 ) -> Responses:
-    """Return the responses of a second mode, with its decay up to the last tap."""
+    """Return the responses of a second mode, each with its decay from the tap to the last one."""
     responses = responses_of(second.mode, second.range_pct, tick_s, count, lengths)
     return responses / np.abs(responses[:, -1:])

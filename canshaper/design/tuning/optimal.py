@@ -130,7 +130,7 @@ def spread(program: Program, count: int) -> list[Vector]:
 
 
 def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]:
-    """Return starts from these poles."""
+    """Return the starts, as z, of these poles; raise DesignError where they are not negative."""
     points = []
     for poles in starts:
         if len(poles) != program.size or not all(p < 0.0 for p in poles):

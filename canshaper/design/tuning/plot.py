@@ -43,9 +43,6 @@ def figure(
     """Return the picture of a setting.
 
     Args:
-        axis: name of the axis.
-        setting: the setting.
-        mode: sway mode of the axis.
         tick_s: period of the axis, s.
         machine: limits and valve behind the filter.
         full_speed_m_s: speed of the tip at full command, for the swing in degrees.

@@ -77,7 +77,7 @@ def front(
 
 
 def chosen(choices: list[Choice], preference: float) -> Choice:
-    """Return the setting of a front for a preference."""
+    """Return the setting of a front for a preference from 0, quickest, to 1, calmest."""
 
     def shares(first: int) -> list[float]:
         sums = [sum(one.felt[first : first + 2]) for one in choices]

@@ -142,7 +142,7 @@ class Program:
         return Solution(z, self.cost(z), active, stats["success"])
 
     def cost(self, z: Vector) -> float:
-        """Return the cost of a setting, whatever its requirements."""
+        """Return the cost of the setting ``z``, also where it breaks requirements."""
         return float(self._cost(z))
 
     def response(self, z: Vector) -> Vector:

@@ -152,7 +152,7 @@ def shortest(
     rate_per_s: float,
     second: SecondMode | None = None,
 ) -> RobustShaper:
-    """Return the shortest impulse response with at most this residual over the range (bisection).
+    """Return the shortest response that leaves at most this part of either mode (bisection).
 
     Raises:
         DesignError: no response of five swings is good enough, or a value is out of range.
@@ -196,7 +196,8 @@ def time_optimal_s(
 ) -> float:
     """Return the least time in s of a speed change by 1 without residual, output in [low, high].
 
-    The output is a limit for shapers, not a shaper for moving joysticks: it may go back.
+    The output is a limit for shapers, not a shaper for moving joysticks: it may go back. Three
+    swings where no shorter time is found.
     """
     n_low, n_high = 1, round(3.0 * mode.period_s / tick_s)
 

@@ -61,8 +61,6 @@ def figure(
     """Return the picture: impulse response, step response, and residual over the length error.
 
     Args:
-        axis: name of the axis.
-        mode: sway mode of the axis.
         tick_s: period of the axis, s.
         machine: limits and valve behind the filter.
         filters: the new filter, and that of the file if there is one.
@@ -107,7 +105,7 @@ def figure(
 
 
 def _ends(response: Sequence[float]) -> int:
-    """Return the tick from which the response stays at its final value."""
+    """Return the number of ticks until the response stays at its final value, and one more."""
     last = [k for k, value in enumerate(response) if abs(value - response[-1]) > 1e-3]
     return (last[-1] if last else 0) + 2
 

@@ -142,7 +142,6 @@ def on_axis(
     Args:
         deployment: the machine; the axis gives the limits, with its stopping distance.
         axis: name of the axis.
-        chosen: the filter.
         sway: sway data; None for that of the axis.
         tail_s: tail in place of that of the file.
     """
@@ -157,7 +156,7 @@ def on_axis(
 
 
 def verdicts(deployment: Deployment) -> Iterator[tuple[Place, Verdict]]:
-    """Yield (place, verdict) of each filter of a swaying axis, profiles and breakpoints too."""
+    """Yield (place, verdict) of each filter of a swaying axis, profiles too; none of kind "off"."""
     for name, bound in deployment.axes.items():
         for place, chosen, sway in every_filter(("axes", name), bound.config):
             if sway is not None and chosen.kind != "off":

@@ -20,7 +20,7 @@ class Fir:
     """Convolution of the command with taps, one a tick, the newest command first.
 
     Args:
-        taps: impulse response, sum 1.
+        taps: impulse response, sum 1 within 0.1 %; it is scaled to 1.
 
     Raises:
         ValueError: no taps, a tap that is not a number, or a sum that is not 1.
@@ -108,7 +108,7 @@ def convolved(first: Sequence[float], second: Sequence[float]) -> list[float]:
 
 
 def ei_taps(mode: SwayMode, tick_s: float, residual: float) -> list[float]:
-    """Extra-insensitive: ``residual`` of the swing is left at the nominal period, zero next to it.
+    """Extra-insensitive: leave part ``residual`` of the swing at the nominal period, 0 next to it.
 
     Three impulses half a swing apart, (1+V)/4, (1-V)/2, (1+V)/4, each smaller by the decay of half
     a swing; between two ticks an impulse is shared linearly (error (omega T)^2 / 8 at most).

@@ -41,7 +41,7 @@ class Following(Protocol):
     """A shaper that follows the swing of a rope; its kind has ``ShaperKind.follows``."""
 
     def prepare(self, least: float, most: float) -> None:
-        """Prepare for ``follow`` with factors from least to most."""
+        """Prepare a filter that has not run for factors of ``follow`` from least to most."""
 
     def follow(self, factor: float) -> None:
         """Adapt to the present sway model, whose period is ``factor`` times the file's."""

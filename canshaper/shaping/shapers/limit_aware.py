@@ -89,7 +89,7 @@ class LimitAware:
         self.shaper.lengthen(longest)
 
     def follow(self, factor: float) -> None:
-        """Adapt to the present sway model: stretch the taps in time by the factor.
+        """Adapt to the present sway model: stretch the taps by the factor, clamped as prepared.
 
         The twin gets the swing that it would have had with this rope from the start. So its swing
         ends with the taps, and the feedback damps what the change of length did to the real swing.

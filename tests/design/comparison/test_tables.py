@@ -80,6 +80,20 @@ def test_rows_and_recommendations(deployment: Deployment) -> None:
     assert better.name == ROBUST
 
 
+def test_a_recommendation_claims_no_bound_that_no_filter_keeps(deployment: Deployment) -> None:
+    """Where no filter leaves little, or none stops in time, the sentence says so."""
+    table = table_of(deployment, ("off", 2.5, 16.0, 0.0), ("ZV", 2.6, 8.0, 0.0))
+    advice = {name: text for name, (_, text) in recommendations(table, period_s=2.2).items()}
+    assert advice["fast"] == (
+        "fast: off stops soonest, 2.5 s after release; none leaves at most 12 % of the unshaped"
+        " swing at lengths within 15 % (32.0 of 32.0 degrees)"
+    )
+    assert advice["balanced"] == (
+        "balanced: ZV leaves least at lengths within 15 % (16.0 degrees); none stops within 0.9"
+        " of a swing (2.6 s)"
+    )
+
+
 @pytest.mark.slow
 def test_the_tables_fit_80_columns(
     deployment: Deployment, capsys: pytest.CaptureFixture[str]
