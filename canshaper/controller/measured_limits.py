@@ -77,7 +77,8 @@ class RopeLength:
     Args:
         lowest_m: shortest rope that the filters know; a shorter one counts as this.
         highest_m: longest one. It counts until a length is known.
-        lost: reaction while the length is not known.
+        lost: what counts while no length is known: the longest; with "hold" the last one; with
+            "neutral" the last one, and the axis must not move.
 
     Attributes:
         length_m: the length now.
@@ -158,7 +159,7 @@ class RopeControl:
         self._follow()
 
     def step(self, now_ns: int) -> ValueEvent | None:
-        """Follow the rope; return the event if its length has become known or was lost."""
+        """Follow the rope; return the event if its length has become known, lost or jumped."""
         rope, measured = self._rope, self._value.fresh(now_ns)
         elapsed_s = 1e-9 * (now_ns - self._last_ns) if self._last_ns is not None else 0.0
         self._last_ns = now_ns

@@ -53,7 +53,7 @@ class ValveMessages:
             control.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late frame moves a valve, and so must not leave.
+        """Return whether a late valve frame moves a valve, and so must not leave.
 
         If so, its alive counter is taken back: the valve sees no gap.
         """
@@ -97,7 +97,7 @@ class ValveMessages:
 
 
 class Counters:
-    """Counts of faults, by the signal names of the status message."""
+    """Counts of faults, by the signal names of the status message, and the last fault."""
 
     __slots__ = ("last_fault", "values")
 
@@ -121,14 +121,14 @@ class Counters:
         self.last_fault = FrameFault.NONE
 
     def add(self, fault: FrameFault, count: int = 1) -> None:
-        """Count a fault, and store it as the last one."""
+        """Count a fault, and store it as the last one; without a counter it is only stored."""
         self.last_fault = fault
         signal = self.SIGNAL_OF.get(fault)
         if signal is not None:
             self.values[signal] += count
 
     def status(self) -> dict[str, int]:
-        """Values of the status message."""
+        """Return the counts and the last fault, by the signal names of the status message."""
         return {**self.values, "LastFault": int(self.last_fault)}
 
 
@@ -142,7 +142,7 @@ class OverrunDetector:
     """Counts late ticks against punctual ones.
 
     Attributes:
-        late: the count; with 0 a punctual tick changes nothing.
+        late: the count; at 0 the caller leaves out punctual ticks.
     """
 
     __slots__ = ("_overrun", "late")
@@ -156,7 +156,7 @@ class OverrunDetector:
         self.late, self._overrun = before.late, before._overrun
 
     def tick(self, *, late: bool) -> bool:
-        """Count a tick; return whether there is an overrun. Punctual ticks at 0 need no call."""
+        """Count a tick, at count 0 only a late one may come; return whether there is an overrun."""
         if late:
             self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self.late == LATE_LIMIT

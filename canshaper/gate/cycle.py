@@ -78,7 +78,7 @@ def longest_gap_ns(deployment: Any) -> int:
 
 
 class Standstill:
-    """Finds whether a loop stood still too long since its last tick, or the last of ``before``."""
+    """Finds whether a loop stood still too long since its last tick, or that before a reload."""
 
     def __init__(self, deployment: Any, before: "Standstill | None" = None) -> None:
         # The time when a frame is about to leave; a test may replace it.
@@ -110,7 +110,7 @@ class FrameProcessor(Protocol):
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last is a valve's, and any axis moves."""
+        """Whether the frame handed out last is a valve's, and an axis run in its tick moves."""
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Receive a frame; return the frame for the other bus of a gateway, or None."""
