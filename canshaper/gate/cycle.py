@@ -179,12 +179,7 @@ def io_cycle(
 
     A frame that moves a valve, and was computed before the process was held up, does not leave
     afterwards. Its tick does not count as run, so the next one sees how long the loop stood still.
-
-    Args:
-        processor, ports: receiver and source of the frames; buses by name.
-        now_ns: time of this tick by ``boottime_ns``.
-        missed: deadlines missed since the last tick.
-        standstill: knows the time of the last tick.
+    ``now_ns`` is the time of this tick by ``boottime_ns``; deadlines are missed since the last one.
     """
     if standstill.over(now_ns):
         processor.stalled()

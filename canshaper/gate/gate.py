@@ -161,10 +161,7 @@ class Gate:
     def leaving(self, key: Key, data: bytes, of: bytes | None = None) -> str:
         """Return why a frame may not leave; else empty, and it counts as one that has left.
 
-        Args:
-            key: its bus, identifier, and whether that has 29 bits.
-            data: its bytes.
-            of: bytes of the joystick's frame of which a gateway has made it; else None.
+        A gateway has made it ``of`` the data of a joystick's frame; else that is None.
         """
         valve = self.valves.get(key)
         if valve is None:
@@ -217,7 +214,6 @@ class Gate:
         """Continue the state of the gate before a reload: each latch stays latched.
 
         Args:
-            before: the gate of the file before.
             reopened: buses that were closed meanwhile: no frame received on them counts as good.
         """
         self.made = before.made
