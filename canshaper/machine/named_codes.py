@@ -73,6 +73,7 @@ def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
             (("feedback",), axis.feedback),
             (("sway_sensor",), axis.sway_sensor),
             (("limits", "ends"), axis.limits.ends),
+            (("sway", "length"), axis.sway.length if axis.sway else None),
         ):
             if section:
                 place = ("axes", name, *key, "codes")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.inputs.value import MeasuredSignal
 from canshaper.machine.binding import load_deployment
 from tests.rigs.files import CONFIG, ROOT, problems, read
 from tests.rigs.overhead import FILE, changed
@@ -64,6 +65,27 @@ def test_a_signal_without_a_range_is_no_length(tmp_path: Path) -> None:
     ):
         (tmp_path / "own.dbc").write_text(dbc.replace(old, new), encoding="cp1252")
         assert any(says in problem for problem in problems(path))
+
+
+@pytest.mark.parametrize("meaning", ["", "value", "fault"])
+def test_a_named_length_is_what_the_file_says(tmp_path: Path, meaning: str) -> None:
+    dbc = (ROOT / "dbc" / "bridge-crane.dbc").read_text(encoding="cp1252")
+    named = f'{dbc}VAL_ 1040 RopeLength 500 "Virhe" 501 "Error" ;\n'
+    (tmp_path / "own.dbc").write_text(named, encoding="cp1252")
+    keys = (
+        f"signal: RopeLength, codes: {{ Virhe: {meaning} }}," if meaning else "signal: RopeLength,"
+    )
+    dbc_of = (str(ROOT / "dbc" / "bridge-crane.dbc"), "own.dbc")
+    path = changed(tmp_path, dbc_of, ("signal: RopeLength,", keys))
+    if not meaning:
+        says = 'sway.length.codes to say whether 500 "Virhe" is a value (1.25 m) or a fault'
+        assert [says in problem for problem in problems(path)] == [True, True]
+        return
+    rope = load_deployment(path).axes["bridge"].rope
+    assert rope is not None
+    measured = MeasuredSignal(rope.signal, 0.5, 160.0)
+    assert (measured.value({"RopeLength": 500}) == 1.25) is (meaning == "value")
+    assert measured.value({"RopeLength": 501}) is None
 
 
 def test_a_filter_that_follows_no_rope_is_refused(tmp_path: Path) -> None:
