@@ -279,7 +279,7 @@ class Controller:
         self._valves.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late valve frame moves a valve: it stays, and its count is reused."""
+        """Return whether a late frame moves a valve and must not leave; if so, reuse its count."""
         return self._valves.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:

@@ -88,7 +88,7 @@ class GatedController:
         self._controller.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late valve frame moves a valve: it stays, and its count is reused."""
+        """Return whether a late frame moves a valve and must not leave; if so, reuse its count."""
         withheld = self._controller.withhold(frame)
         if withheld:
             self._gate.withheld(frame[:3])

@@ -77,8 +77,8 @@ class RopeLength:
     Args:
         lowest_m: shortest rope that the filters know; a shorter one counts as this.
         highest_m: longest one. It counts until a length is known.
-        lost: what counts while no length is known: the longest; with "hold" the last one; with
-            "neutral" the last one, and the axis must not move.
+        lost: length while none is known: with "longest" that, with "hold" the last one; with
+            "neutral" the last one too, but the axis must not move.
 
     Attributes:
         length_m: the length now.
@@ -215,7 +215,7 @@ class SharedFlow:
         self._ticks = self._enough  # since the demands were last scaled
 
     def step(self, now_ns: int, ticks: int) -> Iterator[ValueEvent]:
-        """Scale the demands of this tick, and yield the events for the log.
+        """Scale the demands of this tick, and yield events for the log, which must all be taken.
 
         Args:
             now_ns: monotonic time.

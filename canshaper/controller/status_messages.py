@@ -149,7 +149,7 @@ class SensorReport:
         self._reported_m = 0.0
 
     def events(self) -> Iterator[SwaySensorEvent | SwingLengthEvent]:
-        """Yield changes since the last call: trust in the sensor, a length that ``_is_news``."""
+        """Yield changes since the last call: of trust in the sensor, of the length by a tenth."""
         trust = self._control.trust
         if trust is not self._trust:
             self._trust = trust

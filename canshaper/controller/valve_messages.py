@@ -156,7 +156,7 @@ class OverrunDetector:
         self.late, self._overrun = before.late, before._overrun
 
     def tick(self, *, late: bool) -> bool:
-        """Count a tick, at count 0 only a late one may come; return whether there is an overrun."""
+        """Count a tick, at count 0 only a late one; return whether there is an overrun."""
         if late:
             self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self.late == LATE_LIMIT

@@ -179,7 +179,7 @@ def io_cycle(
 
     A frame that moves a valve, and was computed before the process was held up, does not leave
     afterwards. Its tick does not count as run, so the next one sees how long the loop stood still.
-    ``now_ns`` is the time of this tick by ``boottime_ns``; deadlines are missed since the last one.
+    ``now_ns`` is the time of this tick by ``boottime_ns``; ``missed`` counts from the last tick.
     """
     if standstill.over(now_ns):
         processor.stalled()

@@ -78,9 +78,10 @@ class Input(ABC):
         self.raw: Raw = {}
 
     def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
-        """Receive a frame, and return its fault; with a fault of its content alone it counts.
+        """Receive a frame, and return its fault; one with a fault of its content alone counts.
 
-        Not counted, and no fault: another multiplexor value, or too few good frames in a row yet.
+        A frame with another multiplexor value, or before enough good ones in a row, does not count,
+        though it has no fault.
         """
         if len(data) != self._length:
             return FrameFault.WRONG_LENGTH

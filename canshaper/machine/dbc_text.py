@@ -152,7 +152,7 @@ class DbcText:
         return {self._numbers[i] for i in self._leftover if not self._is_table(i)}
 
     def leftover(self, numbers: Collection[int]) -> list[int]:
-        """Return indices of tables and types of missing signals, without types in ``numbers``."""
+        """Return indices of value tables and types of missing signals, no types in ``numbers``."""
         return [i for i in self._leftover if self._is_table(i) or self._numbers[i] not in numbers]
 
     def leftover_faults(self, places: Iterable[int]) -> Iterator[tuple[int, str]]:

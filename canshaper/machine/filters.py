@@ -149,7 +149,7 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that adjustable numbers may change in motion; low speeds with rehearse_faults."""
+    """Check that adjustable numbers may change in motion, and low speeds for rehearse_faults."""
     if config.control is None:
         return
     from canshaper.config.adjust import Key, faults
