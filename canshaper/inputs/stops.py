@@ -91,8 +91,7 @@ class StopCauses:
         trip: cause for which the next tick trips the axis, neutral at once and latched; None
             without one. A later cause may replace it.
         invalid: whether its input was lost since the last tick, even if it is back by now.
-        foreign_ns: arrival of the last frame of another sender with the id of its valve; None
-            without one in the last second.
+        foreign_ns: arrival of another sender's last frame with the id of its valve; None after 1 s.
     """
 
     def __init__(self) -> None:
