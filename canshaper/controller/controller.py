@@ -288,7 +288,7 @@ class Controller:
         return self._valves.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return neutral frames to be sent last, for every valve but those on silent buses."""
+        """Return neutral frames to send last: none on silent buses, nor where a gateway rests."""
         errors: list[Exception] = []
         for protocol in self._protocols:
             try:

@@ -78,6 +78,8 @@ class ValveMessages:
     def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
         """Return a neutral frame, to be sent last, for every valve whose bus is not silent.
 
+        Where a gateway forwards to the valve, it is returned only if the last one may move it.
+
         Args:
             silent: names of the silent buses.
             errors: list that gets the exceptions; the other valves still get their frames.
