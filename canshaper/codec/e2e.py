@@ -37,7 +37,7 @@ class E2e:
         return data[1] & COUNTER
 
     def __eq__(self, other: object) -> bool:
-        """Return whether ``other`` is the same profile with the same data ID."""
+        """Return whether ``other`` is the same profile with the same data IDs and mode."""
         return type(other) is type(self) and vars(other) == vars(self)
 
     def __hash__(self) -> int:
@@ -49,7 +49,7 @@ class E2e:
         return count < self.counts and data[0] == self.crc(data, count)
 
     def protect(self, data: bytes, count: int) -> bytes:
-        """Return the frame with its header."""
+        """Return the frame with its header, in which the counter is ``count``."""
         data = bytes((0, self.second(data[1], count))) + data[2:]
         return bytes((self.crc(data, count),)) + data[1:]
 
@@ -117,7 +117,7 @@ class Profile2(E2e):
         data_ids: 16 data IDs of 8 bits, by the counter.
 
     Attributes:
-        ids: the data IDs as bytes.
+        ids: each data ID as one byte.
     """
 
     counts = 16

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 
 class Frame(NamedTuple):
-    """A classical CAN data frame on a named bus of the deployment."""
+    """A data frame, classical or CAN FD, on a named bus; an ``extended`` id has 29 bits."""
 
     bus: str
     can_id: int
@@ -23,7 +23,7 @@ new_frame = tuple.__new__
 
 
 class FrameFault(IntEnum):
-    """Fault of a frame or of the bus; the numbers are those of the status message."""
+    """Fault of a frame, bus, node or valve; its number is LastFault of the service status."""
 
     NONE = 0
     WRONG_LENGTH = 1
@@ -103,12 +103,12 @@ _GROUP_OF_PDU2 = 0x03FFFF00
 
 
 def has_destination(can_id: int) -> bool:
-    """Return whether the group is PDU1: its identifiers hold a destination, one node or all."""
+    """Return whether an identifier of 29 bits is PDU1: it holds a destination, one node or all."""
     return (can_id >> 16) & 0xFF < 240
 
 
 def group_mask(can_id: int) -> int:
-    """Return the mask of the bits of an identifier that give its group."""
+    """Return the mask of the bits of an identifier of 29 bits that give its group."""
     return _PAGES_AND_FORMAT if has_destination(can_id) else _GROUP_OF_PDU2
 
 
@@ -133,17 +133,17 @@ def identifier(
 
 
 def pgn_of(can_id: int) -> int:
-    """Parameter group number of an identifier."""
+    """Return the parameter group number of an identifier of 29 bits."""
     return group_of(can_id) >> 8
 
 
 def with_source(can_id: int, source: int) -> int:
-    """Return the identifier with another source address."""
+    """Return an identifier of 29 bits with another source address."""
     return can_id & ~0xFF | source
 
 
 def at_every_priority(can_id: int) -> list[int]:
-    """Return the identifier with each of the 8 priorities: a message is the same at all of them."""
+    """Return an identifier of 29 bits at each of the 8 priorities, all of one J1939 message."""
     return [priority << 26 | can_id & WITHOUT_PRIORITY for priority in range(8)]
 
 
@@ -187,7 +187,7 @@ class NodeState(IntEnum):
 
 
 class ValveState(IntEnum):
-    """State of a valve: low four bits of the control word that requests it, and of the status
+    """State of a CiA 408 valve: low 4 bits of the control word, as demand, and of the status
     word."""
 
     INIT = 0x8
@@ -213,12 +213,12 @@ DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
 
 
 def claims_of(address: int) -> list[int]:
-    """Return the identifiers of "address claimed" and "cannot claim" of a node."""
+    """Return the identifiers with which a node claims its address, or says that it cannot."""
     return [identifier(CLAIMED, source) for source in (address, NULL)]
 
 
 def sent_by(address: int) -> list[int]:
-    """Return the identifiers that a node sends besides claims, commands and status."""
+    """Return the identifiers of a node's acknowledgements, its DM1, and the parts of a long DM1."""
     low = LOWEST_PRIORITY
     return [
         identifier(ACKNOWLEDGE, address),

@@ -19,9 +19,9 @@ FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
 
 def layout_fault(message: Message) -> str | None:
-    """Return why the bits of a message cannot be read, or None.
+    """Return why a message's cycle time, multiplexor or signal numbers are unusable, or None.
 
-    cantools would report these faults only when it decodes a frame.
+    cantools would report these faults only when it decodes a frame, or never.
     """
     if not isinstance(message.cycle_time, int | None) or (message.cycle_time or 0) < 0:
         return f"GenMsgCycleTime: expected a whole number of ms, got {message.cycle_time!r}"
@@ -37,7 +37,7 @@ def layout_fault(message: Message) -> str | None:
 
 
 def _number_fault(signal: Signal) -> str | None:
-    """Return which number of a signal's definition is unusable, or None."""
+    """Return why start value, length, factor or offset of a signal is unusable, or None."""
     first = signal.raw_initial or 0
     if not isinstance(first, int | float) or not math.isfinite(first):
         return f"GenSigStartValue of {signal.name}: expected a number, got {first!r}"
@@ -121,12 +121,12 @@ class Layout:
 
 
 def is_fd(message: Message) -> bool:
-    """Return whether a message is sent in CAN FD: the DBC says so, or its length demands it."""
+    """Return whether a message is CAN FD: by the DBC, or by over 8 bytes that are not J1939."""
     return message.is_fd or (message.length > CLASSICAL_BYTES and not is_j1939(message))
 
 
 def frame_length(message: Message) -> int:
-    """Return the bytes of the frames of a message: CAN FD pads to the next length it has."""
+    """Return the length of a message's frames, bytes; CAN FD pads to the next length up to 64."""
     if not is_fd(message):
         return message.length
     return next((n for n in FD_LENGTHS if n >= message.length), message.length)

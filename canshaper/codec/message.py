@@ -43,9 +43,9 @@ UNPROTECTED = Protection()
 
 
 class FieldSet:
-    """Converts physical values to raw values of one message; unset signals keep their start value.
+    """Converts physical to raw values of one message and back, and has the start values.
 
-    The start value is GenSigStartValue; without one 0, in J1939 all bits 1 (not available).
+    A start value is GenSigStartValue; without one 0, of a J1939 integer all bits 1 (unavailable).
 
     Attributes:
         message: the message.
@@ -65,7 +65,7 @@ class FieldSet:
 
     @staticmethod
     def _start(signal: Signal, all_ones: bool) -> int | float:
-        """Return GenSigStartValue (a raw value), clamped to the bits of the signal."""
+        """Return the raw start value, clamped to the bits of an integer signal."""
         if signal.is_float:
             return float(signal.raw_initial or 0.0)
         low, high = raw_limits(signal)
@@ -74,7 +74,7 @@ class FieldSet:
         return min(max(int(signal.raw_initial or 0), low), high)
 
     def raw(self, name: str, value: float) -> int:
-        """Return the raw value nearest to a physical one, clamped to the bits of the signal.
+        """Return the raw value of an integer signal nearest to ``value``, clamped to its bits.
 
         It is clamped, not refused: a status beyond its range shall still be seen.
         """
@@ -82,7 +82,7 @@ class FieldSet:
         return min(max(round((value - offset) / scale), low), high)
 
     def value(self, name: str, raw: float) -> float:
-        """Return the physical value of a raw value."""
+        """Return the value of an integer signal's raw value, in the unit of the DBC."""
         scale, offset, _, _ = self._fields[name]
         return raw * scale + offset
 
@@ -169,12 +169,12 @@ class Sender:
         self._count = (self._count - 1) % self._counts if self._counts else 0
 
     def instead(self, frame: Frame) -> Frame:
-        """Return a frame that replaces the last one, which was not sent: with the same count."""
+        """Return the last frame, which was not sent, anew: same count, present raw values."""
         self.take_back()
         return self.frame()
 
     def copy_state(self, before: Self) -> None:
-        """Continue the count of ``before`` if its counter has as many values; else stay at 0."""
+        """Continue the count of ``before`` if its counter has as many values; else keep the own."""
         if self._counts == before._counts:
             self._count = before._count
 
@@ -184,10 +184,11 @@ class SequenceChecker:
 
     Args:
         protection: protection of the message.
-        max_step: largest good step of the counter; None for the default.
+        max_step: largest good step of the counter; None: 3, or half of its values if less.
         qualify: good frames in a row that are needed at the start and after a wrong one.
 
     Attributes:
+        max_step: largest good step of the counter.
         qualified: whether the last good frame may be used: enough have come in a row.
     """
 
@@ -211,12 +212,12 @@ class SequenceChecker:
             self.qualified = self._good >= self._qualify
 
     def resync(self) -> None:
-        """Accept every count but a repeated one in the next frame: the sender was silent."""
+        """After silence, accept any next count but a repeated one, and count good frames anew."""
         self._resynced = True
         self._requalify()
 
     def check(self, data: bytes, count: int) -> FrameFault:
-        """Check a frame of the right length, and return its fault.
+        """Check a frame of the right length; return its fault, ``NONE`` without one.
 
         Args:
             data: bytes of the frame.

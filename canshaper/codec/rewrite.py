@@ -1,4 +1,4 @@
-"""Frames that are forwarded: how their bytes change, and whether the kernel can do it."""
+"""Joystick frames that a gateway forwards with other velocities, by us or by can-gw."""
 
 import struct
 from typing import Any
@@ -29,7 +29,7 @@ class RewrittenMessage(SentMessage):
             available" for all others.
         enable: name of the signal of its enable switch.
         ours: names of the signals that the axes write.
-        ours_mask: mask of the bits of the velocities, byte 0 the lowest.
+        ours_mask: mask of the bits of ``ours``, byte 0 the lowest.
         mask_of_all: ``ours_mask`` and the bits of the alive counter.
     """
 
@@ -66,7 +66,7 @@ class RewrittenMessage(SentMessage):
         return int.from_bytes(low, "little") ^ int.from_bytes(high, "little")
 
     def neutral_bits(self) -> int:
-        """Return the bits of all velocities at neutral, byte 0 the lowest."""
+        """Return the bits of ``ours`` at neutral, byte 0 the lowest."""
         return int.from_bytes(self.fields.layout.encode(self.start), "little") & self.ours_mask
 
     def sender(self) -> "RewritingSender":
@@ -75,7 +75,7 @@ class RewrittenMessage(SentMessage):
 
 
 class RewritingSender(Sender):
-    """Sends the rewritten message: in place of each joystick frame, and alone where none comes."""
+    """Builds what leaves: joystick frames with our velocities, own frames where none comes."""
 
     def __init__(self, message: RewrittenMessage) -> None:
         super().__init__(message)
@@ -97,13 +97,13 @@ class RewritingSender(Sender):
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:
-        """Return a frame without joystick data: present velocities, start values, enable switch."""
+        """Return a frame of our own: velocities now, enable 1 or its start value, all else rest."""
         self.raw[self._enable] = 1 if enabled else self._start
         return self.frame()
 
 
 def _at_rest(signal: Signal, start: Any) -> Any:
-    """Return a raw value that demands nothing: 0 for a velocity, else the start value."""
+    """Return the raw value of 0 if the range has both signs and start is no fault; else start."""
     low, high = signal.minimum, signal.maximum
     name = str((signal.choices or {}).get(start, ""))
     if low is None or high is None or not low < 0 < high or named_fault(name):
@@ -137,9 +137,9 @@ def neutral_fault(protection: Protection, length: int) -> str | None:
 
 
 def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, bytes], ...], int]:
-    """Return the check as attributes of a can-gw rule, and the bits that must be 0 before it.
+    """Return (type, content) of can-gw's attributes, and a mask of bits that must be 0 before.
 
-    ``neutral_fault`` has found nothing.
+    ``neutral_fault`` has found nothing. In the mask byte 0 is the lowest.
     """
     check = protection.check
     last = length - 1

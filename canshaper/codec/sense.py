@@ -61,7 +61,7 @@ def free(name: str) -> bool | None:
 
 
 def of_signal(name: str, *, stop: bool = False) -> bool | None:
-    """Return what value 1 means by the last word of the signal's name: ``on``, or ``free``."""
+    """Return whether 1 means on (``stop``: free) by the last word of a signal's name, or None."""
     last = words(name).rpartition(" ")[2]
     if last == "no":  # SwitchNo1
         return None
@@ -89,13 +89,13 @@ def turned(positive: str, negative: str) -> bool:
 def contrary(
     names: Mapping[int, str], signal: str, *, stop: bool = False, known: bool = False
 ) -> str | None:
-    """Return the state, by the names, in which a switch wrongly permits motion; None if all agree.
+    """Return in words the state in which a switch would act against its names; None if none.
 
     Args:
         names: DBC names of the raw values 0 and 1, as far as there are any.
         signal: name of the signal, which counts where the names of its values say neither.
-        stop: True for an emergency stop, free at 0; every other switch is on at 1.
-        known: whether a permitting value disagrees if its name, perhaps of a fault, says neither.
+        stop: True for an emergency stop, which is free at 0; any other switch acts at 1.
+        known: True refuses also an acting value whose name says neither: perhaps a fault's.
     """
     sense = free if stop else on
     acts, rests = (names.get(raw, "") for raw in ((0, 1) if stop else (1, 0)))

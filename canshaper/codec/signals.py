@@ -65,7 +65,7 @@ def symmetrical_range(signal: Signal) -> str | None:
 
 
 def full_scale(signal: Signal) -> float:
-    """Return the value at full command: the end of the range; the nearer to 0 if they differ."""
+    """Return the value at full command: how far the range reaches both ways, or from 0 upwards."""
     low, high = signal.minimum or 0.0, signal.maximum or 0.0
     return min(-low, high) if low < 0.0 else high
 
@@ -136,7 +136,7 @@ def neutral_fault(signal: Signal, band: float, listed: Container[str] = ()) -> s
 
 
 def few_steps(signal: Signal, full: float) -> str | None:
-    """Return why the resolution of a signal is too coarse, or None; ``full``: its full scale."""
+    """Return why a signal has too few steps to ``full``, or None; floats and 4 bits have enough."""
     steps = full / abs(signal.scale)
     if signal.is_float or signal.length <= 4 or steps + STEP_ROUNDING >= LEAST_STEPS:
         return None
@@ -149,7 +149,7 @@ def valve_steps(full: float, scale: float) -> int:
 
 
 def command_fault(signal: Signal) -> str | None:
-    """Return why a signal of symmetrical range cannot command a valve, or None."""
+    """Return why a signal has too few steps or no exact zero to command a valve, or None."""
     if valve_steps(full_scale(signal), abs(signal.scale)) < LEAST_STEPS:
         return f"{signal.name} has fewer than {LEAST_STEPS} steps to full command"
     zero = signal.offset / signal.scale
@@ -201,7 +201,7 @@ def in_range(signal: Signal, value: float) -> bool:
 
 
 def code_fault(signal: Signal, raw: int) -> str | None:
-    """Return why a signal can never have the code ``raw``, by its bits or its range; else None."""
+    """Return why an integer signal can never be ``raw``, by bits or range; None for a float."""
     if signal.is_float:
         return None  # noted as no integer
     low, high = raw_limits(signal)
@@ -285,7 +285,7 @@ FARTHEST_M = 120.0
 
 
 def radius_range(signal: Signal) -> str | None:
-    """Return why a signal, or its range, cannot be that of a radius in m; None where it can."""
+    """Return why unit or range of a signal cannot be those of a radius in m, or None."""
     if signal.unit not in LENGTHS:
         return f"{signal.name}: expected a radius in m, got a signal in {signal.unit}"
     if fault := ends_fault(signal, "what lies outside is no radius"):

@@ -45,7 +45,7 @@ class StatusField(Generic[Source]):
     meaning: str = ""
 
     def shown(self, value: object) -> str:
-        """Return a decoded value as text: the name of a code, "unknown" for codes without one."""
+        """Return a decoded value as text: a code's name, "unknown (7)" without one, or a number."""
         if isinstance(value, IntEnum):
             return value.name
         return f"unknown ({value})" if isinstance(self.decode, _Code) else f"{value:g}"
@@ -120,7 +120,7 @@ AIM: list[StatusField[Any]] = [
     StatusField("AimReach", attrgetter("radius_m"), required=True),
     StatusField("AimKnown", attrgetter("known"), bool, True, 1),
 ]
-"""How far the tip still travels if the joysticks are released now."""
+"""How far (degrees, m) the tip still travels if the joysticks are released now."""
 
 
 class StatusCodec(Generic[Source]):
@@ -140,7 +140,7 @@ class StatusCodec(Generic[Source]):
         self.fields = [one for one in fields if one.name in message.fields.start]
 
     def values(self, source: Source) -> dict[str, int]:
-        """Return the raw values by signal; measurements are clamped to the bits of their signal."""
+        """Return raw values of ``source`` by signal; measurements are clamped to their bits."""
         raw: dict[str, int] = {}
         for one in self.fields:
             value = one.encode(source)
@@ -149,7 +149,7 @@ class StatusCodec(Generic[Source]):
         return raw
 
     def decode(self, data: bytes) -> dict[str, Any] | None:
-        """Return the values of a frame by field name; None where its length is wrong."""
+        """Return the decoded values of a frame by field name; None where its length is wrong."""
         fields = self.message.fields
         if len(data) != fields.layout.length:
             return None

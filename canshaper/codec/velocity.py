@@ -146,7 +146,7 @@ class RockerVelocity:
 
 
 def _fault(flags: tuple[int, int, int]) -> Reason:
-    """Return the reason why these flags show no direction."""
+    """Return the reason why (neutral, negative, positive) show no direction."""
     codes = {flag for flag in flags if flag > 1}
     if not codes:
         return Reason.JOYSTICK_CONTRADICTORY
@@ -207,7 +207,7 @@ class ValveCodec:
     """Writes the command of one axis, a whole number of steps, into its signals, and reads it.
 
     Args:
-        message: the message that carries the command.
+        message: the message that carries the command; its start values become neutral.
         signal: signal of the command; with ``direction`` or ``negative`` of its magnitude.
         direction: signals that carry the direction; None where the command is signed.
         negative: signal of the magnitude of negative commands, scaled as ``signal``, where each
@@ -216,6 +216,7 @@ class ValveCodec:
 
     Attributes:
         steps: steps from zero to full command.
+        zero, sign: raw value at zero; -1 where the raw value falls as the command rises.
     """
 
     def __init__(
@@ -237,10 +238,10 @@ class ValveCodec:
         self.put(message.start, 0)
 
     def put(self, raw: dict[str, Any], steps: int) -> None:
-        """Put a command into the message.
+        """Put a command into the raw values of the message.
 
         Args:
-            raw: raw values of the message, by signal.
+            raw: raw values, by signal; changed in place.
             steps: the command; negative for the negative direction.
 
         Raises:
@@ -263,7 +264,7 @@ class ValveCodec:
             raw[name] = zero + round(full * size / self.steps)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """Return the steps of the command in raw values; None where these are no valid command."""
+        """Return the signed steps in raw values, without ``also``; None for no valid command."""
         steps = self.sign * (int(raw[self._signal]) - self.zero)
         if self._direction is not None:
             sign = self._direction.read(raw)

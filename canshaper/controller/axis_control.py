@@ -36,11 +36,13 @@ class AxisControl:
         valve: sender of its valve's message.
         axis: the shaped axis: state machine, filter and output stage.
         period_ticks, period_s: time between two setpoints to its valve, ticks and seconds.
-        room: how far it may still move each way ahead of its end stops, full speed times seconds.
+        room: (back, ahead), how far it may still move to its end stops, full speed times seconds;
+            back is negative, and without end stops both are infinite.
         displaced: how far a motion has moved it from where its own demands lead, full speed times
             seconds.
         stops: causes to stop it or to keep it from starting, besides its joystick.
-        added, damps: what a two-axis motion asks of this axis, see ``ShapedAxis.command``.
+        added: velocity that a two-axis motion asks this axis to add, part of full speed.
+        damps: whether that motion asks it to damp the swing that the other axis causes.
         radius: measured radius of the tip of an axis that slews, or None.
         other: the axis whose motion makes the load of this one swing, or None; both have sway
             sensors of one kind.
@@ -101,7 +103,7 @@ class AxisControl:
         self.axis.drop_added()
 
     def new_filter(self) -> tuple[Shaper, SwayModel | None]:
-        """Return a new filter as the file describes it, with a new sway model."""
+        """Return a new filter by the present ``bound.config``, and its new sway model or None."""
         config, period_s = self.bound.config, self.period_s
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         return _shaper(config, period_s, sway), sway
@@ -161,7 +163,7 @@ class AxisControl:
 
         Args:
             config: the new configuration. Its filter suits the period of this axis; its limits
-                differ in neutral only.
+                differ only while the axis is neutral.
         """
         limits = self.limits(config)
         if limits != self.limits(self.bound.config):
@@ -174,6 +176,9 @@ class AxisControl:
 
     def hold(self, last: int, now: int) -> Transition | None:
         """Count missed deadlines, in which the valve kept its last output.
+
+        Args:
+            last, now: numbers of the deadline of the last tick and of the one of this tick.
 
         Returns:
             The change of state, if the filter failed in them; else None.
@@ -193,6 +198,9 @@ class AxisControl:
             now_ns: monotonic time.
             emergency: the emergency stop, where there is one.
             overrun: whether too many deadlines were missed lately.
+
+        Returns:
+            The change of state of this tick, or in TRIPPED the first error of the filter; or None.
         """
         fault = None
         axis, joystick, stops = self.axis, self._joystick, self.stops
@@ -232,7 +240,7 @@ class AxisControl:
         return transition
 
     def put(self, steps: int) -> None:
-        """Put a setpoint, in steps, into the message of the valve."""
+        """Put a setpoint, signed steps of the valve's signal, into the message of the valve."""
         self.bound.valve.put(self.valve.raw, steps)
 
     def _scale(self, now_ns: int) -> float:

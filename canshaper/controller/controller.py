@@ -28,7 +28,7 @@ class Controller:
     Attributes:
         counters: counts of the faults so far.
         joysticks: the joysticks by name.
-        inputs: receiver of each message that has an exact identifier.
+        inputs: receiver of each message that has an exact identifier, by (bus, id, extended).
         events: events for the log since the owner last emptied the list.
         motions: the two-axis motions.
         valves: the valve messages.
@@ -113,7 +113,7 @@ class Controller:
         return NOWHERE.union(*(protocol.silent for protocol in self._protocols))
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Take a received frame.
+        """Take a received frame, and count its fault.
 
         Args:
             frame: the frame.
@@ -147,7 +147,7 @@ class Controller:
         return None
 
     def _forward(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Return a joystick's new frame with our velocities for the other bus of a gateway."""
+        """Return a joystick's frame with our velocities, for the other bus, or None; set moves."""
         for rule in self._forwarding.values():
             if rule.new_frame():
                 if self._stood_still:  # this frame has waited: it is never passed on
@@ -279,16 +279,16 @@ class Controller:
         self.valves.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late valve frame moves a valve, and so must not leave."""
+        """Return whether a late frame moves a valve and must not leave; if so, reuse its count."""
         return self.valves.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
-        """Trip the axes of a valve frame that the gate has refused; see ``ValveMessages``."""
+        """Trip the axes of a valve frame that the gate has refused; return a neutral one for it."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
         return self.valves.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return a neutral frame for every valve, to be sent last; see ``not_neutral``."""
+        """Return neutral frames to send last: none on silent buses, nor where a gateway rests."""
         errors: list[Exception] = []
         for protocol in self._protocols:
             try:

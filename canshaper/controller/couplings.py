@@ -42,7 +42,7 @@ class _Member:
         moving.fall_per_s = axis.limits.fall_per_s
 
     def update(self, tick_s: float, last: int, now: int) -> None:
-        """Copy the state of the axis; for the deadlines see ``MotionControl.step``."""
+        """Copy the state of the axis; ``last`` and ``now`` are the numbers of two deadlines."""
         moving, control = self.moving, self.control
         axis, period = control.axis, control.period_ticks
         if period == 1 == now - last:
@@ -122,7 +122,9 @@ class MotionControl:
             moving.fall_per_s = control.bound.config.limits.fall_per_s
 
     def step(self, now_ns: int, last: int, now: int) -> MotionEvent | None:
-        """Find what each axis adds to its own output in this tick, and store it in its control.
+        """Find what each axis adds to its output now: nothing while a measurement drives one.
+
+        It is stored in ``added``, ``damps`` and ``displaced`` of the axes.
 
         Args:
             now_ns: monotonic time.
@@ -130,7 +132,7 @@ class MotionControl:
             now: number of this deadline.
 
         Returns:
-            The event, if the axes have just begun or ceased to move as one; else None.
+            The event, if what keeps the axes from moving as one has changed; else None.
         """
         apart = ""
         tick_s, members = self.tick_s, self._members

@@ -65,8 +65,8 @@ class MotionEvent:
 
     Attributes:
         motion: name of the motion in the file.
-        why: what keeps the axes apart: ``radius=lost``, or an axis with its state; empty where they
-            move as one.
+        why: what keeps the axes apart: ``radius=lost``, or an axis and its state, ``slew=TRIPPED``;
+            empty where they move as one.
     """
 
     motion: str
@@ -113,12 +113,12 @@ class SwaySensorEvent:
 
 @dataclass(frozen=True, slots=True)
 class SwingLengthEvent:
-    """Change of the measured pendulum length: it differs from the file, or agrees with it again.
+    """The measured pendulum length differs from the last reported one, at first from the file's.
 
     Attributes:
         axis: name of the axis in the file.
         seen: length that the sway sensor has shown.
-        file: sway data of the axis in the file.
+        file: sway data of the axis, of the file or as changed since.
     """
 
     axis: str

@@ -27,14 +27,14 @@ class GatedController:
         self._quiet_until_ns: dict[MessageKey, int] = {}
 
     def carry_over(self, before: "GatedController") -> None:
-        """Continue from the state before a reload; see ``Gate.carry_over``."""
+        """Continue the gate's state before a reload; the caller carries the controller's over."""
         buses = self._controller.deployment.config.buses
         open_before = before._controller.deployment.config.buses.values()
         reopened = frozenset(name for name, bus in buses.items() if bus not in open_before)
         self._gate.carry_over(before._gate, reopened)
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Give a frame from a bus to gate and controller; see ``Controller.receive``."""
+        """Give a frame to gate and controller; return the one for the other bus of a gateway."""
         message = self._gate.receive(frame[:3], frame[3], now_ns)
         passed = self._controller.receive(frame, now_ns)
         if message is not None and message.of.protection.known:
@@ -45,7 +45,7 @@ class GatedController:
         return self._instead(passed, why, now_ns, frame[3]) if why else passed
 
     def demand(self, axis: str, part: float) -> None:
-        """Set the demand of a measurement in place of the joystick's; see ``Gate.measure``."""
+        """Set a measurement's demand, [-1, 1] of full command, in place of the joystick's."""
         self._gate.measure(axis, part)
 
     @property
@@ -59,7 +59,7 @@ class GatedController:
         self._controller.stalled()
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
-        """Run one tick, and yield the frames to send now; see ``Controller.tick``."""
+        """Run one tick; yield the frames to send now, neutral in place of refused valve frames."""
         self._gate.tick(now_ns, missed)
         leaving = self._gate.leaving
         for frame in self._controller.tick(now_ns, missed):
@@ -87,7 +87,7 @@ class GatedController:
         self._controller.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late valve frame moves a valve, and so must not leave."""
+        """Return whether a late frame moves a valve and must not leave; if so, reuse its count."""
         withheld = self._controller.withhold(frame)
         if withheld:
             self._gate.withheld(frame[:3])
@@ -104,7 +104,7 @@ class GatedController:
         return passed
 
     def _compare(self, message: Received, frame: Frame, now_ns: int) -> None:
-        """Stop each axis whose demand gate and codec decode differently from this frame."""
+        """Stop axes whose demands differ by gate and codec; all, if only one accepts the frame."""
         joystick, axes = self._controller.joysticks[message.of.name], message.axes
         wrong = axes if message.good_ns != joystick.received_ns else []
         if not wrong and message.good_ns == now_ns:
@@ -120,7 +120,7 @@ class GatedController:
                 self._controller.events.append(event)
 
     def _loud(self, frame: Frame, now_ns: int) -> bool:
-        """Return whether an event of this message is logged: one in ``QUIET_NS``."""
+        """Return whether an event of this message is logged: at most one in ``QUIET_NS``."""
         key = frame[:3]
         loud = now_ns >= self._quiet_until_ns.get(key, 0)
         if loud:
@@ -128,7 +128,9 @@ class GatedController:
         return loud
 
     def _instead(self, frame: Frame, why: str, now_ns: int, of: bytes | None) -> Frame | None:
-        """Return a neutral frame in place of a refused one, or None if that is refused too.
+        """Stop the axes of a refused frame; return a neutral one in its place.
+
+        It is None where the frame is no valve's, or the neutral one is refused too.
 
         Args:
             frame: the refused frame.

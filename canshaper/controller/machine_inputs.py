@@ -37,7 +37,7 @@ class MachineInputs:
         stop: the emergency stop, or None.
         load_state: signal of the load state, or None.
         profile: the operator's choice of a profile, or None.
-        sway_sensors: message with measurements of sway, by the name of each axis that reads it.
+        sway_sensors: input with measurements of sway, by the name of each axis that reads it.
         radii: measured radius of the tip, by the name of its two-axis motion.
         ropes: measured length of the rope, by the name of the axis that follows it.
         positions: measured position, by the name of the axis that has ends.
@@ -68,7 +68,7 @@ class MachineInputs:
         self.sway_sensors = self._sway_sensors(deployment)
 
     def _sway_sensors(self, deployment: Deployment) -> dict[str, "SwaySensorInput"]:
-        """Return the message with measurements of sway, by the name of each axis that reads it."""
+        """Return ``sway_sensors``, one input for each message."""
         sensors = {n: axis.sway_sensor for n, axis in deployment.axes.items() if axis.sway_sensor}
         if not sensors:
             return {}
@@ -80,7 +80,7 @@ class MachineInputs:
         return {name: inputs[sensor.message.key] for name, sensor in sensors.items()}
 
     def _enable(self, deployment: Deployment) -> dict[str, list[Switch]]:
-        """Return ``gates``; give each joystick the switch to press, where another has it."""
+        """Return ``gates``; give each joystick the switch to press, if another message has it."""
         named: dict[str, Switch] = {}
         for bound in deployment.switches:
             message = SwitchInput(bound, bound.switches)
@@ -143,7 +143,7 @@ def parts(
         senders: senders of its messages.
         inputs: receivers of its messages, by bus and identifier.
         axes: the axes by name.
-        protocols: those of the machine.
+        protocols: protocols of its buses.
     """
     places = {n: (bus.interface, bus.channel) for n, bus in deployment.config.buses.items()}
 

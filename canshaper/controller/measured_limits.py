@@ -77,7 +77,8 @@ class RopeLength:
     Args:
         lowest_m: shortest rope that the filters know; a shorter one counts as this.
         highest_m: longest one. It counts until a length is known.
-        lost: reaction while the length is not known.
+        lost: length while none is known: with "longest" that, with "hold" the last one; with
+            "neutral" the last one too, but the axis must not move.
 
     Attributes:
         length_m: the length now.
@@ -163,7 +164,7 @@ class RopeControl:
         self._follow()
 
     def step(self, now_ns: int) -> ValueEvent | None:
-        """Follow the rope; return the event if its length has become known or was lost."""
+        """Follow the rope; return the event if its length has become known, lost or jumped."""
         rope, measured = self._rope, self._value.fresh(now_ns)
         elapsed_s = 1e-9 * (now_ns - self._last_ns) if self._last_ns is not None else 0.0
         self._last_ns = now_ns
@@ -219,7 +220,7 @@ class SharedFlow:
         self._ticks = self._enough  # since the demands were last scaled
 
     def step(self, now_ns: int, ticks: int) -> Iterator[ValueEvent]:
-        """Scale the demands of this tick, and yield the events for the log.
+        """Scale the demands of this tick, and yield events for the log, which must all be taken.
 
         Args:
             now_ns: monotonic time.

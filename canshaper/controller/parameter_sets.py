@@ -76,10 +76,9 @@ class SetChooser:
         bound: the axis.
         axis: the shaped axis, which is retuned.
         load: the load, or None without a signal for it.
-        profile: see below.
+        profile: the operator's choice, or None; an attribute too.
 
     Attributes:
-        profile: the operator's choice, or None.
         number: number of the parameter set in force: 0 the axis' own, then its sets, then each
             profile and its sets, in the order of the file; between two sets the nearer one.
     """
@@ -109,7 +108,7 @@ class SetChooser:
         self._late = round(LATE_S / axis.sway.tick_s) if axis.sway else 0
 
     def update(self, now_ns: int) -> None:
-        """Retune the axis if load or operator asks for another parameter set."""
+        """Retune the axis by load and operator; a change of profile waits for a steady speed."""
         self._follow_press()
         name = self.profile.name(now_ns) if self.profile else ""
         if name not in self._programs:
@@ -162,14 +161,14 @@ class SetChooser:
 
 
 def profile_by_number(bound: BoundAxis) -> list[str]:
-    """Return the profile of each parameter set of an axis, by the number of the set."""
+    """Return the name of the profile of each parameter set, in their order; [] without profiles."""
     if not bound.config.profiles:
         return []
     return [name for name, (_, sets) in programs(bound).items() for _ in range(1 + len(sets))]
 
 
 def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[ParameterSet]]]:
-    """Return base set and breakpoint sets of each profile by its name ("" without one)."""
+    """Return base and breakpoint sets of each profile by name; "" names the axis' own filter."""
     config = bound.config
     assert config.sway is not None  # checked with the deployment
     mode = config.sway.mode()

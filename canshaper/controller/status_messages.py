@@ -37,9 +37,9 @@ class AimPoint:
         axes: axes of the machine by name.
 
     Attributes:
-        codec, ticks: codec of the message, and the ticks from one to the next.
+        codec, ticks: codec of the message, and the ticks from one message to the next.
         slew_deg: angle that the crane still turns, degrees; 0 while it is not known.
-        radius_m: way of the tip out (positive) or in; 0 while it is not known.
+        radius_m: way of the tip out (positive) or in, m; 0 while it is not known.
         known: whether both are known.
     """
 
@@ -148,7 +148,7 @@ class SensorReport:
         self._reported_m = 0.0
 
     def events(self) -> Iterator[SwaySensorEvent | SwingLengthEvent]:
-        """Yield changes since the last call: trust state of the sensor, pendulum length."""
+        """Yield changes since the last call: of trust in the sensor, of the length by a tenth."""
         trust = self._control.trust
         if trust is not self._trust:
             self._trust = trust
@@ -163,7 +163,7 @@ class SensorReport:
                 yield SwingLengthEvent(self._name, length, sway)
 
     def _is_news(self, length: "SwingLength", mode: SwayMode) -> bool:
-        """Return whether the length differs from the last reported one, or else from the file.
+        """Return whether the length differs by a tenth from the last reported, at first the file's.
 
         With the parameter set of a load nothing is news: the report would name a key of the file
         that is not in force.

@@ -53,7 +53,7 @@ class ValveMessages:
             control.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
-        """Return whether a late frame moves a valve, and so must not leave."""
+        """Return whether a late frame moves a valve and must not leave; if so, reuse its count."""
         moves = any(control.axis.output.steps for control in self._axes[frame[:3]])
         if moves:
             self.take_back(frame[:3])
@@ -78,6 +78,8 @@ class ValveMessages:
     def neutral_frames(self, silent: frozenset[str], errors: list[Exception]) -> list[Frame]:
         """Return a neutral frame, to be sent last, for every valve whose bus is not silent.
 
+        Where a gateway forwards to the valve, it is returned only if the last one may move it.
+
         Args:
             silent: names of the silent buses.
             errors: list that gets the exceptions; the other valves still get their frames.
@@ -97,7 +99,7 @@ class ValveMessages:
 
 
 class Counters:
-    """Counts of faults, by the signal names of the status message."""
+    """Counts of faults, by the signal names of the status message, and the last fault."""
 
     __slots__ = ("last_fault", "values")
 
@@ -121,14 +123,14 @@ class Counters:
         self.last_fault = FrameFault.NONE
 
     def add(self, fault: FrameFault, count: int = 1) -> None:
-        """Count a fault, and store it as the last one."""
+        """Count a fault, and store it as the last one; without a counter it is only stored."""
         self.last_fault = fault
         signal = self.SIGNAL_OF.get(fault)
         if signal is not None:
             self.values[signal] += count
 
     def status(self) -> dict[str, int]:
-        """Values of the status message."""
+        """Return the counts and the last fault, by the signal names of the status message."""
         return {**self.values, "LastFault": int(self.last_fault)}
 
 
@@ -142,7 +144,7 @@ class OverrunDetector:
     """Counts late ticks against punctual ones.
 
     Attributes:
-        late: the count; with 0 a punctual tick changes nothing.
+        late: the count; at 0 the caller leaves out punctual ticks.
     """
 
     __slots__ = ("_overrun", "late")
@@ -156,7 +158,7 @@ class OverrunDetector:
         self.late, self._overrun = before.late, before._overrun
 
     def tick(self, *, late: bool) -> bool:
-        """Count a tick; return whether there is an overrun. Punctual ticks at 0 need no call."""
+        """Count a tick, at count 0 only a late one; return whether there is an overrun."""
         if late:
             self.late = min(self.late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self.late == LATE_LIMIT

@@ -32,7 +32,10 @@ class Asked:
         self._last = self._since = -1  # period of the last note, and of the last stop
 
     def note(self, size: float, distance: float, period: int, of: Axis) -> None:
-        """Remember the demand of this period: velocity, and distance since the last note."""
+        """Remember the demand of this period, and the demanded distance since the last note.
+
+        Size is a part of full speed, distance full speed times seconds.
+        """
         sizes, self._last = self._sizes, period
         if not (size or sizes or self.remaining):
             return
@@ -187,7 +190,7 @@ class AxisState(AxisInput):
         return 0.0 if partner.last else self.of.added
 
     def share(self) -> None:
-        """Find whether the axis or its partner has a demand, after ``look`` of both."""
+        """Find whether axis or partner has a demand within its tail, after ``look`` of both."""
         own, partner = self.forth.most or self.back.most, self.partner
         asked = bool(own or (partner and (partner.forth.most or partner.back.most)))
         self.asked_now, self.asked = asked, asked or self.asked_now
@@ -208,7 +211,7 @@ class AxisState(AxisInput):
         return max(left, 0.0) * rise + of.step
 
     def fallen(self, velocity: float, periods: int) -> float:
-        """Return the speed to which the output has to fall in so many periods in a direction."""
+        """Return the speed to fall to in so many periods; 0 where ``velocity`` turns direction."""
         return self.top - self.of.fall * periods if velocity * self.last >= 0.0 else 0.0
 
     def held_at(self, velocity: float) -> float:
@@ -216,7 +219,7 @@ class AxisState(AxisInput):
         return max(self.now if velocity > 0.0 else -self.now, 0.0)
 
     def left(self, velocity: float, made: int, number: int) -> None:
-        """Remember the velocity of a frame that has left."""
+        """Remember the velocity, part of full speed, of a valve frame that has left."""
         of, last = self.of, self.last
         passed, self.ticks, self.sent_at = self.ticks, 0, number
         if not velocity:

@@ -32,7 +32,7 @@ HEARTBEAT, NMT, START, WORDS = 0x700, 0x000, 1, frozenset((0x8, 0x9, 0xB, 0xF, 0
 
 
 def record_of(deployment: Any) -> Record:
-    """Return the record of a deployment."""
+    """Return the gate's record of a deployment (``machine.Deployment``)."""
     config = deployment.config
     messages = {name: _message(name, one, config) for name, one in deployment.joysticks.items()}
     switches: dict[str, Switch] = {}
@@ -191,7 +191,7 @@ def _axis(bound: Any, deployment: Any) -> Axis:
 
 
 def slack_of(config: Any) -> float:
-    """Return how far a filter may run ahead of the demand, full speed times seconds."""
+    """Return how far a filter may run ahead of the demand, full speed times seconds, or inf."""
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
     one = not (config.gain_schedule or config.profiles or config.sway_sensor)
@@ -274,7 +274,7 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
 
 
 def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
-    """Yield (key, (lengths, contents or none)) of status messages and those of our own nodes."""
+    """Yield (key, (lengths, contents; empty: any)) of status messages and those of our nodes."""
     anything, config = frozenset[bytes](), deployment.config
     of_axes = (one.status for one in config.axes.values())
     aims = (one.aim for one in config.motion.values())

@@ -78,7 +78,7 @@ def longest_gap_ns(deployment: Any) -> int:
 
 
 class Standstill:
-    """Finds whether a loop stood still too long since its last tick, or the last of ``before``."""
+    """Finds whether a loop stood still too long since its last tick, or that before a reload."""
 
     def __init__(self, deployment: Any, before: "Standstill | None" = None) -> None:
         # The time when a frame is about to leave; a test may replace it.
@@ -114,7 +114,7 @@ class FrameProcessor(Protocol):
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last is a valve's, and any axis moves."""
+        """Whether the frame handed out last is a valve's, and an axis run in its tick moves."""
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Receive a frame; return the frame for the other bus of a gateway, or None."""
@@ -183,12 +183,7 @@ def io_cycle(
 
     A frame that moves a valve, and was computed before the process was held up, does not leave
     afterwards. Its tick does not count as run, so the next one sees how long the loop stood still.
-
-    Args:
-        processor, ports: receiver and source of the frames; buses by name.
-        now_ns: time of this tick by ``boottime_ns``.
-        missed: deadlines missed since the last tick.
-        standstill: knows the time of the last tick.
+    ``now_ns`` is the time of this tick by ``boottime_ns``; ``missed`` counts from the last tick.
     """
     if standstill.over(now_ns):
         processor.stalled()

@@ -73,7 +73,7 @@ class Gate:
         return message if message.axes else None
 
     def _by_group(self, key: Key, now_ns: int) -> Received | None:
-        """Find the J1939 message that any address may send; note others' commands to our valves."""
+        """Return the J1939 message that any address may send; stop valves that others command."""
         bus, can_id, extended = key
         if key in self.valves:
             self._foreign(self.valves[key], now_ns)
@@ -92,7 +92,7 @@ class Gate:
         return None
 
     def _foreign(self, valve: ValveState, now_ns: int) -> None:
-        """Stop a valve that another sender commands, unless we only listen."""
+        """Stop the axes of a valve that another sender commands, unless we only listen."""
         if not self.record.listens:
             for axis in valve.axes:
                 axis.foreign_ns = now_ns
@@ -120,7 +120,7 @@ class Gate:
         self.valves[key].count = self.valves[key].before
 
     def set(self, key: str, value: float) -> None:
-        """Change a number of the file, with the key axes.NAME.SECTION.KEY."""
+        """Change a number by its key axes.NAME.SECTION.KEY, clamped to its range in the file."""
         name, section, last = key.rsplit(".", 2)
         axis = self.axes[name.removeprefix("axes.")]
         axis.of.set(f"{section}.{last}", value)
@@ -135,7 +135,7 @@ class Gate:
     # --- a tick ----------------------------------------------------------------------------------
 
     def tick(self, now_ns: int, missed: int) -> None:
-        """Begin a tick, after so many missed deadlines."""
+        """Begin a tick after so many missed deadlines: find what may leave in it."""
         last, self.number = self.number, self.number + 1 + missed
         self.made += 1
         self.others.clear()
@@ -164,7 +164,10 @@ class Gate:
     # --- what goes out ---------------------------------------------------------------------------
 
     def leaving(self, key: Key, data: bytes, of: bytes | None = None) -> str:
-        """Return why a frame, in a gateway made ``of`` a joystick's, may not leave; else empty."""
+        """Return why a frame may not leave; else empty, and it counts as one that has left.
+
+        A gateway has made it ``of`` the data of a joystick's frame; else that is None.
+        """
         valve = self.valves.get(key)
         if valve is None:
             self.others[key] = sent = self.others.get(key, 0) + 1
@@ -200,7 +203,7 @@ class Gate:
             axis.halt("refused", self.made, self.frames, latch=True)
 
     def last(self, key: Key, data: bytes) -> str:
-        """Return why a frame may not be the last one: its bytes have to be right, and neutral."""
+        """Return why a valve frame may not be the last one, right and neutral; or empty."""
         valve, word = self.valves[key], word_of(data)
         if why := rules.bytes_refused(valve, data, word, None, last=True):
             return why
@@ -216,7 +219,6 @@ class Gate:
         """Continue the state of the gate before a reload: each latch stays latched.
 
         Args:
-            before: the gate of the file before.
             reopened: buses that were closed meanwhile: no frame received on them counts as good.
         """
         self.made, self.frames = before.made, before.frames

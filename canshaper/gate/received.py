@@ -16,7 +16,7 @@ class AxisInput:
     """Input of an axis: its demand, and each reason to stop since its last turn, however brief.
 
     Attributes:
-        demand: demand of the last joystick frame that counts.
+        demand: demand, [-1, 1], of the last joystick frame that counts; None where it has none.
         changed_ns: time since when the demand has this value.
         foreign_ns: time when a second sender was received last.
         hard: a reason to stop at once, or empty.
@@ -90,7 +90,7 @@ class Received:
         return True, True
 
     def from_other(self, source: int, now_ns: int) -> bool:
-        """Return whether a second J1939 address sends this message while the first one does."""
+        """Return whether another J1939 address still sends the message; else ``source`` counts."""
         if source != self.source:
             if now_ns - self.source_ns <= self.of.timeout_ns:
                 return True
@@ -106,7 +106,7 @@ class Received:
         return self.good_ns is None or now_ns - self.good_ns > self.of.timeout_ns
 
     def forget(self) -> None:
-        """Let no frame received so far count."""
+        """Let no frame received so far count, and accept any next counter but the last."""
         self.good_ns, self.intact_ns = None, NEVER
 
     def carry_over(self, before: "Received", *, missed: bool) -> None:

@@ -124,7 +124,7 @@ def distance(axis: AxisState, velocity: float) -> str:
 
 
 def velocity_refused(axis: AxisState, velocity: float, made: int) -> str:
-    """Return why a velocity other than 0 may not leave, by rules 3 to 7; empty if it may."""
+    """Return why a velocity (full speeds, not 0) may not leave, by rules 3 to 7; empty: it may."""
     ticks = axis.ticks if axis.of.forwarded else 1
     fallen = axis.fallen(velocity, min(ticks, 1))
     why = (

@@ -131,7 +131,7 @@ def command_of(message: Any, valve: Any, joystick: Any, in_dbc: Any) -> Command:
 
 
 def start_of(signal: Any, *, j1939: bool) -> float:
-    """Return the raw value of an unset signal: GenSigStartValue; else all ones in J1939, or 0."""
+    """Return the raw value of an unset signal: GenSigStartValue; or 0, J1939 integers all ones."""
     if signal.is_float:
         real = REALS[signal.length]
         return float(struct.unpack(real, struct.pack(real, signal.raw_initial or 0.0))[0])
@@ -142,7 +142,7 @@ def start_of(signal: Any, *, j1939: bool) -> float:
 
 
 def rest_of(signal: Any) -> set[float]:
-    """Return the raw value at zero of a signed velocity, which demands nothing; else no value."""
+    """Return the raw value at zero of a signed velocity; an empty set for any other signal."""
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or not low < 0 < high:
         return set()

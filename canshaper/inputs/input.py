@@ -45,7 +45,7 @@ class Receiver(Protocol):
     """Receives the frames of one message."""
 
     def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
-        """Receive a frame, and return its fault."""
+        """Receive a frame, and return its fault, or ``NONE``."""
 
     def invalidate(self) -> None:
         """Invalidate everything received so far."""
@@ -56,13 +56,13 @@ class MessageInput(Receiver, Part, Protocol):
 
 
 class Input(ABC):
-    """One received message: checks its frames, and keeps the last good one.
+    """One received message: checks its frames, and keeps the last one that counts.
 
     The age of a frame counts from its arrival. A release of enable or a press of the emergency stop
     is counted when its frame is read, and has no age: the next tick sees it, however late that is.
 
     Attributes:
-        raw: raw values of the last good frame.
+        raw: raw values of the last frame that counts.
     """
 
     def __init__(self, bound: BoundInput) -> None:
@@ -78,7 +78,11 @@ class Input(ABC):
         self.raw: Raw = {}
 
     def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
-        """Receive a frame, and return its fault; only a frame without a fault counts."""
+        """Receive a frame, and return its fault; one with a fault of its content alone counts.
+
+        A frame with another multiplexor value, or before enough good ones in a row, does not count,
+        though it has no fault.
+        """
         if len(data) != self._length:
             return FrameFault.WRONG_LENGTH
         raw = self._decode(data)
@@ -118,11 +122,11 @@ class Input(ABC):
 
     @property
     def received_ns(self) -> int | None:
-        """Arrival of the last good frame, monotonic time; None where none counts."""
+        """Arrival of the last frame that counts, monotonic time; None where none does."""
         return self._received_ns
 
     def invalidate(self) -> None:
-        """Invalidate everything received so far."""
+        """Invalidate everything received so far, but for a release or a press of the stop."""
         self._received_ns = self._last_frame_ns = None
 
     def copy_state(self, before: Self) -> None:
@@ -131,7 +135,7 @@ class Input(ABC):
         self._last_frame_ns, self._refused_ns = before._last_frame_ns, before._refused_ns
 
     def lost(self, now_ns: int) -> Reason | None:
-        """Return why the message is lost; None while its last good frame is fresh."""
+        """Return why the message is lost: refused frames or silence; None while a frame counts."""
         if self._received_ns is not None and now_ns - self._received_ns <= self._timeout_ns:
             return None
         if self._refused_ns is not None and now_ns - self._refused_ns <= self._timeout_ns:
@@ -177,15 +181,15 @@ class Switch:
             self.released = False
 
     def doubted(self, releases: int) -> bool:
-        """Return whether only frames that were not accepted have shown a release.
+        """Return whether the last accepted frame agrees, and others have shown a release since.
 
         Args:
-            releases: ``self.releases`` at the last call.
+            releases: ``self.releases`` at the call before.
         """
         return self._agreed and (self.released or self._doubted > releases)
 
     def lost(self, now_ns: int) -> Reason | None:
-        """Return why it is not known; None while its message is fresh."""
+        """Return why its message is lost; None while that is fresh."""
         return self._source.lost(now_ns)
 
 

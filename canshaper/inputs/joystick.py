@@ -26,7 +26,7 @@ class JoystickInput(Input):
         pressed: the enable switch to press, if it is in another message; else None.
         releases: number of frames that showed its own enable switch released, accepted or not.
         presses: how often its button for the next profile was pressed.
-        commands: velocity of each signal in the last good frame, or the reason why it has none.
+        commands: velocity, [-1, 1], of each signal in the last accepted frame, or why it has none.
     """
 
     def __init__(self, joystick: BoundJoystick) -> None:
@@ -48,13 +48,14 @@ class JoystickInput(Input):
         self._doubted = 0  # number of the last release in a frame that was not accepted
 
     def watch(self, signal: str) -> Switch:
-        """Return another switch in its message, which enables this or another joystick."""
+        """Return another switch in its message, on at 1, which enables this or another joystick."""
         return self._switches.setdefault(signal, Switch(self, signal, 1))
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take enable, buttons and velocities; a code that is no velocity is a fault.
+        """Take a frame: any can show a release of enable, only an accepted one ends it.
 
-        Any frame can show a release of enable; only an accepted one ends it.
+        Only an accepted one gives profile button and velocities; its fault is an invalid code of
+        enable or of a velocity.
         """
         for switch in self._switches.values():
             switch.on_frame(raw, accepted)
@@ -82,7 +83,7 @@ class JoystickInput(Input):
         return GOOD if valid else FrameFault.INVALID_SIGNAL
 
     def _press(self, code: int, arrived_ns: int) -> None:
-        """Count a press of the profile button, unless it began in a gap of the frames."""
+        """Count a press of the profile button, unless the first frame or one after a gap has it."""
         received_ns = self._received_ns
         if received_ns is None or arrived_ns - received_ns > self._timeout_ns:
             self._next_held = True
@@ -100,7 +101,7 @@ class JoystickInput(Input):
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> tuple[CommandInput, int]:
-        """Return the input of the axis that this signal drives, and how often enable was released.
+        """Return the input of the axis that this signal drives, and the releases of enable so far.
 
         A release counts when its frame is read, however old the frame is. All else is as old as the
         arrival of its frame.
@@ -110,8 +111,8 @@ class JoystickInput(Input):
             now_ns: monotonic time.
             releases: number of releases at the last tick of this axis.
             trip: a cause for neutral at once, handed through.
-            neutral_band: largest |joystick| that counts as neutral, where it may stand still
-                forever.
+            neutral_band: largest |velocity|, part of full, that is neutral: it may stand still
+                there forever.
         """
         pressed = self.pressed
         known = self.releases if pressed is None else pressed.releases

@@ -29,7 +29,7 @@ class EnableGate:
         self._releases = self._count()
 
     def __call__(self, neutral: bool, now_ns: int) -> Reason | None:
-        """Return the reason, or None; a release since the last call counts, however short."""
+        """Return ENABLE_OFF (neutral) or ENABLE_LOST; None if all agreed since the last call."""
         releases, self._releases = self._releases, self._count()
         agree = releases == self._releases
         if agree and not any(one.released or one.lost(now_ns) for one in self._switches):
@@ -68,7 +68,7 @@ class EmergencyStopInput(Input):
         self._pressed = before._pressed
 
     def stops(self, now_ns: int) -> bool:
-        """Return whether it is pressed or lost, so that nothing may move."""
+        """Return whether the stop is pressed or its message lost, so that nothing may move."""
         return self._pressed or self.lost(now_ns) is not None
 
     def stop(self, now_ns: int, presses: int) -> Reason | None:
@@ -87,11 +87,11 @@ class StopCauses:
     """Causes for which one axis stops or may not begin.
 
     Attributes:
-        interlocks: they have to agree before the axis may move; of several the first one counts.
+        interlocks: they have to agree before the axis may move; the first objection counts.
         trip: cause for which the next tick trips the axis, neutral at once and latched; None
             without one. A later cause may replace it.
         invalid: whether its input was lost since the last tick, even if it is back by now.
-        foreign_ns: arrival of the last frame of another sender with the id of its valve.
+        foreign_ns: arrival of another sender's last frame with the id of its valve; None after 1 s.
     """
 
     def __init__(self) -> None:
@@ -119,7 +119,7 @@ class StopCauses:
     def fault(
         self, now_ns: int, emergency: EmergencyStopInput | None, *, neutral: bool
     ) -> Reason | None:
-        """Return why the axis has to stop or may not begin; set ``trip`` for what acts at once.
+        """Return why the axis stops shaped or may not begin; put what acts at once into ``trip``.
 
         Args:
             now_ns: monotonic time.

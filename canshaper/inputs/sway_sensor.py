@@ -19,7 +19,7 @@ class SwaySensorInput(Input):
     """A message with measurements for one axis or several.
 
     Attributes:
-        number: number of good frames so far.
+        number: number of accepted frames so far.
         values: values of the last one by signal, in the unit of the DBC; None for a code without
             a value.
     """
@@ -32,7 +32,7 @@ class SwaySensorInput(Input):
         self.values: dict[str, float | None] = {}
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take the values of an accepted frame; in any frame a code that is no value is a fault."""
+        """Take an accepted frame's values; in any frame an error code or a bad merit is a fault."""
         values = {one.name: self._value(one, raw) for one in self._signals}
         if accepted:
             self.number += 1
@@ -76,7 +76,10 @@ class SwaySignal:
         self._number = message.number
 
     def new_value(self) -> float | None:
-        """Return a new measurement, rad or rad/s with the sign of the model; None without one."""
+        """Return a new measurement, rad or rad/s with the sign of the model; None without one.
+
+        It is None too while the node does not work, and above ``MOST``.
+        """
         message = self._message
         if message.number == self._number:
             return None

@@ -41,7 +41,7 @@ class MeasuredSignal:
         self._low, self._high = low, high
 
     def value(self, raw: Raw) -> float | None:
-        """Return its value from the raw values of a message, in the DBC's unit, or None."""
+        """Return its value from the raw values of a message, in the DBC's unit; None for none."""
         code = raw[self.name]
         value: float = code * self._scale + self._offset
         return value if code not in self._special and self._low <= value <= self._high else None
@@ -54,7 +54,7 @@ class Value:
         signal: the signal.
         low: smallest valid value.
         high: largest valid value.
-        timeout_ms: age from which the value is no longer known.
+        timeout_ms: age after which the value is no longer known.
 
     Attributes:
         value: last valid value, in the unit of the DBC.
@@ -68,7 +68,7 @@ class Value:
         self.measured_ns: int | None = None
 
     def take(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take the value of a frame; a code that is no value is a fault."""
+        """Take the value of an accepted frame; in any frame a code that is no value is a fault."""
         value = self._signal.value(raw)
         if value is None:
             return FrameFault.INVALID_SIGNAL
@@ -95,7 +95,7 @@ class PositionInput(Input):
         self._values: list[Value] = []
 
     def read(self, bound: BoundValue[Position]) -> Value:
-        """Return a position that each frame updates, within the range of its signal in the DBC."""
+        """Return a position that accepted frames update, within its signal's range in the DBC."""
         low, high = bound.signal.minimum, bound.signal.maximum
         assert low is not None and high is not None  # checked with the deployment
         value = Value(bound.signal, low, high, bound.config.timeout_ms)
@@ -103,7 +103,7 @@ class PositionInput(Input):
         return value
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take every value; a code that is no value is a fault, and the others count."""
+        """Take each value of an accepted frame; in any frame a code that is no value is a fault."""
         faults = [value.take(raw, arrived_ns, accepted) for value in self._values]
         return next(filter(None, faults), GOOD)
 
@@ -131,7 +131,7 @@ class ValueInput(Value, Input):
         Value.__init__(self, signal, low, high, bound.config.timeout_ms)
 
     def on_frame(self, raw: Raw, arrived_ns: int, accepted: bool) -> FrameFault:
-        """Take the value; a code that is no value is a fault."""
+        """Take the value of an accepted frame; in any frame a code that is no value is a fault."""
         return self.take(raw, arrived_ns, accepted)
 
     def invalidate(self) -> None:
@@ -141,7 +141,7 @@ class ValueInput(Value, Input):
 
 
 def measurable(signal: Signal) -> tuple[float, float]:
-    """Return the range of valid measurements of a signal, a millionth wider for rounding."""
+    """Return the range of a signal's measurements, a millionth wider; all numbers without one."""
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or high <= low:
         return -LARGEST, LARGEST
@@ -190,7 +190,7 @@ class ProfileButtons:
         self._names = tuple(names)
 
     def name(self, _now_ns: int) -> str:
-        """Return the name after all presses so far; a lost joystick changes nothing."""
+        """Return the name after all presses since start or reload; a lost joystick adds none."""
         presses = sum(joystick.presses for joystick in self._joysticks)
         return self._names[presses % len(self._names)]
 

@@ -15,7 +15,7 @@ from canshaper.machine.valves import BoundAxis, SharedValves, bind_valve
 
 
 def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
-    """Bind the axes; return every axis without a problem, by name."""
+    """Bind the axes; return each without a problem by name, slewing axes first."""
     shared_valves: SharedValves = {}
     # A slewing axis acts first: when it trips, the other axis adds nothing for it in the same tick.
     slewing = {motion.slew for motion in lookup.config.motion.values()}

@@ -139,7 +139,7 @@ def _check_together(lookup: Lookup, joysticks: Mapping[str, BoundJoystick | None
 
 
 def _bind_profile(lookup: Lookup) -> BoundValue[Choosing] | None:
-    """Bind the switch that selects the profile, if the file has one."""
+    """Bind the switch or display that selects the profile; None if the file has none."""
     config = lookup.config.profile
     profile = bind_switch(lookup, ("profile",), config) if config else None
     if profile and config:
@@ -197,7 +197,7 @@ PROTOCOL = {
 
 
 def check_names(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that no two names differ only in case and spaces, as a person would confuse them."""
+    """Check that no two buses, joysticks, switches or axes differ in case or outer spaces only."""
     for key, what in (
         ("buses", "bus"),
         ("joysticks", "joystick"),
@@ -212,9 +212,9 @@ def check_names(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_ids(lookup: Lookup) -> None:
-    """Check that no message has the id of another message, or of our own node on J1939.
+    """Check that no J1939 message has the id of another message, or of our own node.
 
-    It compares J1939 with other messages; ``Lookup.message`` compares messages of one kind.
+    Two messages of J1939, or two others, are compared where ``Lookup.message`` finds them.
     """
     seen: dict[tuple[str, int], UsedMessage] = {}
     for (bus, _, extended), used in lookup.used.items():

@@ -82,7 +82,7 @@ def _fd_faults(bus: Bus, parameters: Container[str]) -> Iterator[tuple[Place, st
 
 
 def _kinds(opens: Any) -> dict[str, Any]:
-    """Return the annotated types of the parameters, by name."""
+    """Return the annotated types of the parameters, by name; {} if one of them is unknown here."""
     try:
         return get_type_hints(opens)
     except Exception:  # names that only a type checker knows
@@ -104,7 +104,7 @@ def _value_fault(kind: Any, value: object) -> str | None:
 
 
 def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check every bus: its keys and options, and that no two share channel, device or NAME."""
+    """Check every bus: keys, options, node ids; that no two share channel, device or NAME."""
     add = diagnostics.add
     channels: dict[tuple[str, str], str] = {}
     names: dict[J1939Name, str] = {}
@@ -223,14 +223,14 @@ BUSY = 0.5
 
 
 def longest_frame_bits(extended: bool, length: int) -> int:
-    """Return the bits of a data frame with all stuff bits and the interframe space."""
+    """Return the most bits of a data frame, stuff bits and interframe space included."""
     if extended:
         return 67 + 8 * length + (53 + 8 * length) // 4
     return 47 + 8 * length + (33 + 8 * length) // 4
 
 
 def longest_fd_bits(extended: bool, length: int) -> tuple[int, int]:
-    """Return the bits of a CAN FD frame at the nominal bit rate, and at the data bit rate."""
+    """Return the most bits of a CAN FD frame at the nominal bit rate, and at the data bit rate."""
     head = 36 if extended else 17
     stuffed_head = (head - 1) // 4
     content = 5 + 8 * length

@@ -28,7 +28,7 @@ class Correction:
 
 
 def scalings(config: DeploymentConfig, bus: str, message: str) -> dict[str, Correction]:
-    """Return the signals of a message whose scaling the deployment file corrects, by name."""
+    """Return the scaling of each signal of a message that the file corrects, by name."""
     result: dict[str, Correction] = {}
     for axis in config.axes.values():
         command, valve = axis.command, axis.valve
@@ -52,7 +52,7 @@ _BIT = re.compile(r"([^/.]+)/(\d{1,2})")
 
 
 def bit_names(config: DeploymentConfig, bus: str, message: str) -> dict[str, set[int]]:
-    """Return the bits of a message that the file names as SIGNAL/BIT, by signal."""
+    """Return the numbers of the bits that the file names as SIGNAL/BIT in a message, by signal."""
     names: list[str] = []
     for _, section in sections(config):
         if isinstance(section, Protected) and (section.bus, section.message) == (bus, message):
@@ -136,7 +136,7 @@ def corrected(
 
 
 def chosen(message: Message, config: Protected) -> Chosen | None:
-    """Return which frames of a multiplexed message the section uses; None where all, or none."""
+    """Return which frames of a message count by the section's multiplexor value; None for all."""
     signal = multiplexor(message)
     if config.multiplexor is None or signal is None:
         return None

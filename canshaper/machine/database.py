@@ -54,7 +54,7 @@ class DbcFile:
         return Problem(str(self.path), next(lines, None), message.name, text)
 
     def read(self, name: str) -> Message | str:
-        """Load one more message of the file; return it, or why it cannot be loaded.
+        """Read the file again for one more message; return it, or why it cannot be loaded.
 
         Raises:
             OSError: the file cannot be read.
@@ -79,7 +79,8 @@ def load_dbc(
 
     Args:
         path: path of the file.
-        names: names of the messages to load; by default all that can be loaded.
+        names: names of the messages to load, ignored where the file lacks them; by default all
+            that can be loaded.
 
     Raises:
         OSError: the file cannot be read.
@@ -223,11 +224,11 @@ class Messages:
         return {entry.key for file in self.files for entry in file.entries}
 
     def all(self) -> list[Message]:
-        """Return every loaded message."""
+        """Return every message loaded with its file, but none that ``find`` has loaded later."""
         return [message for file in self.files for message in file.messages]
 
     def named(self, ids: Collection[tuple[int, bool]]) -> list[str]:
-        """Return the names of the messages with these (id, extended)."""
+        """Return the sorted names of the messages, loaded or not, with these (id, extended)."""
         return sorted(e.name for file in self.files for e in file.entries if e.key in ids)
 
     def warnings(self) -> tuple[int, list[Problem]]:

@@ -87,7 +87,7 @@ def _explained(text: str, cause: Exception, why: str) -> tuple[int, str] | None:
 
 
 def _attribute(text: str, name: str) -> re.Match[str] | None:
-    """Find the first statement that gives an attribute a value."""
+    """Find the first statement that gives an attribute a value; None without one."""
     value = rf'^[^\S\n]*BA_\s+"{re.escape(name)}"\s+((?:(?:BU|BO|SG|EV)_\s)?)([^;]*)'
     return re.search(value, text, re.MULTILINE)
 
@@ -97,7 +97,7 @@ def _line_at(text: str, place: int) -> int:
 
 
 def letters(text: str) -> int:
-    """Return the number of letters but line ends, which remain of messages that are left out."""
+    """Return the number of characters but line ends, which stay of messages that are left out."""
     return len(text) - text.count("\n")
 
 

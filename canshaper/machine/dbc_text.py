@@ -135,7 +135,7 @@ class DbcText:
     _leftover: "array[int]"
 
     def of(self, numbers: Collection[int]) -> str:
-        """Return the text without other messages and leftover tables; lines keep their numbers."""
+        """Return the text without messages of other ids and leftover tables; lines keep numbers."""
         return b"".join(self._parts(numbers)).decode("cp1252", errors="replace")
 
     def whole(self) -> str:
@@ -148,15 +148,15 @@ class DbcText:
         return len(self._starts)
 
     def without_type(self) -> set[int]:
-        """Return messages with the value type of a missing signal: whose bits it means is open."""
+        """Return the ids of messages with the value type of a missing signal: its bits are open."""
         return {self._numbers[i] for i in self._leftover if not self._is_table(i)}
 
     def leftover(self, numbers: Collection[int]) -> list[int]:
-        """Return value tables and types of signals that do not exist, but types in ``numbers``."""
+        """Return indices of value tables and types of missing signals, no types in ``numbers``."""
         return [i for i in self._leftover if self._is_table(i) or self._numbers[i] not in numbers]
 
     def leftover_faults(self, places: Iterable[int]) -> Iterator[tuple[int, str]]:
-        """Yield (line, fault) of each statement that ``leftover`` has found."""
+        """Yield (line, fault) of these statements, as ``leftover`` gives them, in its order."""
         line = at = 0
         for i in places:
             start = self._starts[i]
@@ -246,7 +246,7 @@ def _id_fault(number: int) -> str | None:
 
 
 def signals_fault(text: bytes, length: int) -> tuple[list[bytes], str | None]:
-    """Return a message's signal names, and its first fault or None; cantools checks used messages.
+    """Return a message's signal names, and its first fault: overlap, no room, name twice; or None.
 
     Args:
         text: the signals of the message.

@@ -30,7 +30,7 @@ from canshaper.machine.valves import BoundAxis
 
 @dataclass(frozen=True)
 class BoundMotion:
-    """A motion with its messages.
+    """A two-axis motion with its messages.
 
     Attributes:
         config: section of the motion.
@@ -46,7 +46,7 @@ class BoundMotion:
 
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
-    """Bind every motion; return them by name. An axis may be part of one motion at most."""
+    """Bind every two-axis motion; return them by name. An axis may be part of one at most."""
     moved: dict[str, str] = {}
     motions = {}
     for name, motion in lookup.config.motion.items():
@@ -113,7 +113,7 @@ class Deployment:
     switches: list[BoundSwitches]
     on_bus: dict[str, list[Message]]
     fd: frozenset[MessageKey]
-    """Used messages that are sent in frames of CAN FD."""
+    """Used messages, received or sent, in frames of CAN FD, by (bus, id, extended)."""
     source: Source = field(compare=False)
     """The deployment file with line numbers, for problems that show only on this computer."""
     codes: tuple[NamedCode, ...] = ()
@@ -181,7 +181,7 @@ class Deployment:
         return [*self.joysticks.values(), *self.switches, *stop]
 
     def sent(self) -> list[SentMessage]:
-        """Return every message of the DBC files that we send, each once."""
+        """Return every valve and status message of the machine once, even if we only listen."""
         valves = [axis.valve.message for axis in self.axes.values()]
         statuses = [status.message for status in self._statuses()]
         return list({one.key: one for one in (*valves, *statuses)}.values())

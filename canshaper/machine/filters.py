@@ -14,7 +14,7 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 def check_filters(lookup: Lookup, place: Place, axis: AxisSection, period_s: float) -> None:
-    """Check that every filter that the axis may use runs at the period of its valve (seconds)."""
+    """Check that each filter of an axis runs at its valve's period, and that its profiles exist."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
     check_rope(lookup, place, axis)
     parts, filters = _parts(place, axis), every_filter(place, axis)
@@ -82,7 +82,7 @@ def every_filter(place: Place, axis: AxisSection) -> list[tuple[Place, Filter, S
 def at_ends(place: Place, axis: AxisSection) -> Iterator[tuple[Place, Filter, Sway | None]]:
     """Yield (place, filter, sway data) at the shortest and the longest rope of the axis.
 
-    Yield nothing for a filter that does not follow the rope.
+    Yield nothing without a measured rope, or for a filter that does not follow it.
     """
     sway, chosen = axis.sway, axis.filter
     follows = KINDS[chosen.kind].follows
@@ -149,7 +149,7 @@ def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Check that every adjustable number may change in motion, and speeds with rehearse_faults."""
+    """Check that adjustable numbers may change in motion, and low speeds for rehearse_faults."""
     if config.control is None:
         return
     from canshaper.config.adjust import AxisKey, faults
@@ -184,7 +184,7 @@ def filter_fault(
         chosen: the filter.
         sway: sway data that it runs with.
         period_s: time between two commands to the valve, seconds.
-        valve_rate_per_s: rate of the valve, full speeds per second.
+        valve_rate_per_s: fastest change of the valve's command, full speeds per second.
     """
     mode = sway.mode() if sway else None
     return _fault(chosen.kind, chosen.parameters(), mode, period_s, valve_rate_per_s)

@@ -72,7 +72,7 @@ def filter_lines(kinds: Iterable[str]) -> Iterator[str]:
 
 @cache
 def program_sha256() -> str:
-    """Return the SHA-256 of the modules of canshaper on the disk, however they were installed."""
+    """Return the SHA-256 of canshaper's modules on the disk, as they were at the first call."""
     total = sha256()
     for path in sorted(_modules()):
         total.update(f"{path.relative_to(PACKAGE).as_posix()}\n".encode())
@@ -94,7 +94,7 @@ def _unreadable(error: OSError) -> None:
 def bind_status(
     lookup: Lookup, place: Place, status: Status | None, fields: Sequence[StatusField[Source]]
 ) -> tuple[StatusCodec[Source] | None, int]:
-    """Bind a status message; return its codec and its period in ticks, (None, 0) without one."""
+    """Bind a status message; return codec and period in ticks, (None, 0) if there is none."""
     if status is None:
         return None, 0
     used = lookup.message(place, status, received=False)

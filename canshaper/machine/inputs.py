@@ -134,7 +134,7 @@ def bind_input(
 
 
 def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[EmergencyStop] | None:
-    """Bind the emergency stop."""
+    """Bind the emergency stop; None where its message is missing."""
     if (result := bind_input(lookup, ("emergency_stop",), config, ("signal",))) is None:
         return None
     used, bound = result
@@ -144,7 +144,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> Bound[Emergenc
 
 
 def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radius] | None:
-    """Bind the measured radius of the tip."""
+    """Bind the measured radius of the tip; None where its message or signal is missing."""
     if (result := _bind_position(lookup, place, config, "the radius")) is None:
         return None
     used, bound = result
@@ -153,7 +153,7 @@ def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundValue[Radi
 
 
 def bind_ends(lookup: Lookup, place: Place, config: Ends) -> BoundValue[Ends] | None:
-    """Bind the position by which an axis is stopped ahead of its end stops."""
+    """Bind the position of an axis with end stops; None where message or signal is missing."""
     if (result := _bind_position(lookup, place, config, "a position")) is None:
         return None
     _check_range(lookup, place, result, ("lowest", "highest"), "a position")
@@ -161,7 +161,7 @@ def bind_ends(lookup: Lookup, place: Place, config: Ends) -> BoundValue[Ends] | 
 
 
 def bind_rope(lookup: Lookup, place: Place, config: RopeSection) -> BoundValue[RopeSection] | None:
-    """Bind the measured length of a rope."""
+    """Bind the measured length of a rope; None where its message or signal is missing."""
     if (result := _bind_position(lookup, place, config, "a length")) is None:
         return None
     used, bound = result
@@ -182,7 +182,7 @@ def bind_rope(lookup: Lookup, place: Place, config: RopeSection) -> BoundValue[R
 
 
 def bind_others(lookup: Lookup, place: Place, config: OtherFlow) -> BoundValue[OtherFlow] | None:
-    """Bind the measured flow of functions that are not ours."""
+    """Bind the flow of functions that are not ours; None where message or signal is missing."""
     if (result := _bind_position(lookup, place, config, "a flow")) is None:
         return None
     _check_range(lookup, place, result, ("full",), "a flow")
@@ -212,7 +212,7 @@ def _check_range(
 def _bind_position(
     lookup: Lookup, place: Place, config: AnyPosition, what: str
 ) -> tuple[UsedMessage, BoundValue[AnyPosition]] | None:
-    """Bind a position, in a message of its own or in one that another section reads too."""
+    """Bind ``what``, a position in a message of its own or in one that other sections read too."""
     key = (config.bus, config.message)
     first = lookup.positions.get(key)
     if alone := first is None:
@@ -233,7 +233,7 @@ def _bind_position(
 
 
 def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[StatusWord] | None:
-    """Bind the status word of a valve."""
+    """Bind the CiA 408 status word of a valve; None where its message is missing."""
     if (result := bind_input(lookup, place, config, ("signal",))) is None:
         return None
     used, bound = result
@@ -243,7 +243,7 @@ def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> Bound[
 
 
 def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Choosing] | None:
-    """Bind the load state, or the operator's choice."""
+    """Bind load state or the operator's choice; None where message or signal is missing."""
     if (result := _bind_value(lookup, place, config)) is None:
         return None
     used, bound = result
@@ -255,7 +255,7 @@ def bind_switch(lookup: Lookup, place: Place, config: Choosing) -> BoundValue[Ch
 def bind_feedback(
     lookup: Lookup, place: Place, config: FeedbackSection
 ) -> BoundValue[FeedbackSection] | None:
-    """Bind the feedback message of a valve."""
+    """Bind the feedback of a valve; None where its message or signal is missing."""
     if (result := _bind_value(lookup, place, config)) is None:
         return None
     used, bound = result
@@ -268,7 +268,7 @@ def bind_feedback(
 def _bind_value(
     lookup: Lookup, place: Place, config: AnyValue
 ) -> tuple[UsedMessage, BoundValue[AnyValue]] | None:
-    """Bind a message of which one signal is read."""
+    """Bind a message of which one signal is read; None where one of both is missing."""
     if (result := bind_input(lookup, place, config, value=config.signal)) is None:
         return None
     used, bound = result

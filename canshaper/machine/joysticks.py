@@ -75,7 +75,7 @@ class BoundSwitches(Bound[SwitchSection]):
 
 
 def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
-    """Yield each signal in a joystick's message that enables a joystick, by its first mention."""
+    """Yield (place of the first mention, name) of signals in a joystick's message that enable."""
     seen: set[str] = set()
     for owner, section in lookup.config.joysticks.items():
         for i, condition in enumerate(named_by(lookup.config, owner)):
@@ -85,7 +85,7 @@ def signals_of(lookup: Lookup, joystick: str) -> Iterator[tuple[Place, str]]:
 
 
 def check_conditions(lookup: Lookup) -> None:
-    """Report joysticks that ``enable`` or ``enable_of`` names and that do not exist."""
+    """Report joysticks in enable and enable_of that do not exist, and switches named twice."""
     config, add = lookup.config, lookup.diagnostics.add
     for name, section in config.joysticks.items():
         if (of := section.enable_of) is not None:
@@ -102,7 +102,7 @@ def check_conditions(lookup: Lookup) -> None:
 
 
 def bind_switches(lookup: Lookup) -> list[BoundSwitches]:
-    """Bind every message with switches."""
+    """Bind every message with switches; report each switch that enables no joystick."""
     readers: dict[tuple[str, str], dict[str, SwitchSection]] = {}
     config, add = lookup.config, lookup.diagnostics.add
     needed = {c for joystick in config.joysticks for c in conditions(config, joystick)}
@@ -144,7 +144,7 @@ def _place(names: list[str] | None, joystick: str, i: int) -> Place:
 
 
 def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick | None:
-    """Bind a joystick, with the velocities that its axes name."""
+    """Bind a joystick, with the velocities that its axes name; None without its message."""
     place: Place = ("joysticks", name)
     switches = ("reset", "anti_sway_off", "next_profile")
     enable = signals_of(lookup, name)

@@ -134,7 +134,7 @@ class Lookup:
         return messages
 
     def check_timeout(self, used: UsedMessage, timeout_ms: int) -> None:
-        """Check that one missed frame, or one missed tick, does not make a message lost."""
+        """Check that a timeout is two cycles and two ticks or more: one missed loses no message."""
         message, tick = used.message, self.config.tick_ms
         cycle = message.cycle_time or 0
         least = 2 * max(cycle, tick)
@@ -144,7 +144,7 @@ class Lookup:
             used.add("timeout_ms", text)
 
     def period(self, used: UsedMessage) -> int:
-        """Return the ticks between two frames of a sent message; 0 if no multiple of the tick."""
+        """Return the ticks between two frames of a sent message; 0 with a problem if not whole."""
         cycle, tick = used.message.cycle_time, self.config.tick_ms
         if not cycle or cycle % tick:
             got = f"{cycle} ms" if cycle else "none"

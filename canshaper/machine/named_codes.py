@@ -27,8 +27,8 @@ class Listing:
         codes: meaning of named values, by name.
         values: values that other keys of the file use, which makes them measurements.
         moves: the axis that the signals move; None where they move none.
-        choice: whether every value without an error's name is a measurement, as a profile's code
-            is, which selects nothing unless the file lists it.
+        choice: True: every value counts that is not named as an error, as of a profile's code,
+            which selects nothing unless the file lists it.
     """
 
     place: Place
@@ -73,6 +73,7 @@ def listings(config: DeploymentConfig) -> dict[tuple[str, str], list[Listing]]:
             (("feedback",), axis.feedback),
             (("sway_sensor",), axis.sway_sensor),
             (("limits", "ends"), axis.limits.ends),
+            (("sway", "length"), axis.sway.length if axis.sway else None),
         ):
             if section:
                 place = ("axes", name, *key, "codes")
@@ -112,7 +113,7 @@ def values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
 
 
 def check_codes(used: UsedMessage, in_dbc: Iterable[Signal], listing: Listing) -> None:
-    """Record what the named values of a section's signals mean; report each undecided one.
+    """Record what named values mean; report undecided ones, and names that the DBC lacks.
 
     Args:
         used: the message, which collects the meanings.

@@ -120,7 +120,7 @@ class Routing:
         return frozenset(k for k, r in self.routes.items() if r.role in (Role.VALVE, Role.SENT))
 
     def received(self, key: MessageKey) -> bool:
-        """Return whether we receive a message: it has a route, or no DBC file lists it."""
+        """Return whether we receive a frame: id or group has a route, or no DBC file has the id."""
         bus, can_id, extended = key
         group = extended and (bus, group_of(can_id)) in self.groups
         return key in self.routes or group or key[1:] not in self.others

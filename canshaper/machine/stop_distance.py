@@ -43,7 +43,9 @@ def output_limits(axis: AxisSection, *, timeout_ms: int, period_s: float) -> Out
     """Return the limits of an axis, with the run-on that its ``stop_distance_m`` leaves.
 
     The tip travels at full speed until a lost joystick is seen, and while a command waits; the
-    run-on may use the rest of the distance. Arguments as of ``allowed_m``.
+    run-on may use the rest.
+
+    ``timeout_ms``: of its joystick; ``period_s``: between two commands to the valve.
     """
     limits = axis.limits.output_limits()
     stated, speed = axis.limits.stop_distance_m, full_speed(axis).m_s
@@ -86,7 +88,7 @@ def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float |
 
     Args:
         axis: the axis.
-        timeout_ms: timeout of its joystick, milliseconds.
+        timeout_ms: longest timeout of its joystick and the switches of that, milliseconds.
         period_s: time between two commands to the valve, seconds.
     """
     speed = full_speed(axis).m_s
@@ -103,7 +105,7 @@ def allowed_m(axis: AxisSection, *, timeout_ms: int, period_s: float) -> float |
 def stated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
     """Return why no limit can keep an axis within its ``stop_distance_m``, or None.
 
-    Arguments as of ``allowed_m``.
+    ``timeout_ms``: of its joystick; ``period_s``: between two commands to the valve.
     """
     stated, speed = axis.limits.stop_distance_m, full_speed(axis).m_s
     if stated is None:
@@ -123,7 +125,7 @@ def stated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str 
 def unstated_fault(axis: AxisSection, *, timeout_ms: int, period_s: float) -> str | None:
     """Return why an axis may not move without a ``stop_distance_m``, or None.
 
-    Arguments as of ``allowed_m``.
+    ``timeout_ms``: of its joystick; ``period_s``: between two commands to the valve.
     """
     allowed = allowed_m(axis, timeout_ms=timeout_ms, period_s=period_s)
     if axis.limits.stop_distance_m is not None or allowed is None or allowed <= MOST_UNSTATED_M:
@@ -154,14 +156,14 @@ def unstated(deployment: Deployment) -> Iterator[tuple[Place, str]]:
 
 
 class When(TypedDict):
-    """Times on which the stopping distance of an axis depends: arguments of ``allowed_m``."""
+    """Timeout of an axis' joystick, and time between two commands to its valve."""
 
     timeout_ms: int
     period_s: float
 
 
 def when(deployment: Deployment, name: str) -> When:
-    """Return the times of an axis: timeout of its joystick, time between two commands."""
+    """Return timeout of an axis' joystick and switches, and time between two commands."""
     axis = deployment.axes[name]
     return {
         "timeout_ms": axis.timeout_ms,

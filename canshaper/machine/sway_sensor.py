@@ -79,7 +79,7 @@ class BoundSwaySensor:
 
 
 def sensor_limits(config: SwaySensorSection) -> SensorLimits:
-    """Return the bounds of the measurements of a sensor."""
+    """Return noise, offset and range of length of a sensor, and its second swing."""
     noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
     second_s = config.second_period_s
     second = SwayMode.from_period(second_s, SECOND_DAMPING) if second_s else None
@@ -172,7 +172,7 @@ def _factor(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> tuple[Si
 
 
 def _merit(used: UsedMessage, axis: str, sensor: SwaySensorSection) -> str | None:
-    """Return the signal of the figure of merit of an axis' sensor, which several may share."""
+    """Return the name of the sensor's figure of merit, which several may share; None without."""
     place = (*_place(axis), "merit")
     signal = used.find(place, sensor.merit)
     if signal is None:

@@ -71,7 +71,7 @@ def flag_of(key: str) -> Contrary:
 
 
 def contrary_fault(signal: Signal, key: str | int, wrong: Contrary) -> str | None:
-    """Return why a switch does the contrary by its names, or None; ``key`` is its key."""
+    """Return why a switch, named by ``key`` of the file, does the contrary in the DBC, or None."""
     choices: Mapping[int, object] = signal.choices or {}
     names = {raw: str(n) for raw, n in choices.items() if not names_broken(str(n))}
     off = key == "anti_sway_off"  # whose own name says off, as it should
@@ -205,7 +205,7 @@ class UsedMessage:
                 self.diagnostics.add(place, f'{text}, whose {raw} is "{code.name}" in the DBC')
 
     def check_start_values(self, start: Mapping[str, float]) -> None:
-        """Check that the start value of each unused signal is at rest: every frame carries it.
+        """Record the start value of each unused signal; report one not at rest, as frames carry it.
 
         Args:
             start: raw start value of every signal of the sent message, by name.

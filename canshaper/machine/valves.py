@@ -51,7 +51,7 @@ _FLOAT = re.compile("float", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SharedValve:
-    """A bound valve message, kept for the other axes whose commands it carries."""
+    """A bound valve message, kept for its other axes; it is sent every so many ``ticks``."""
 
     used: UsedMessage
     ticks: int
@@ -219,7 +219,7 @@ def _rewritten_message(
 
 
 def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -> Signal | None:
-    """Bind the signal of the command, or of its magnitude where other signals say the direction."""
+    """Bind the integer signal of a command, or of its ``magnitude``; None with a problem."""
     signal = used.find(place, name)
     if signal is None:
         return None
@@ -236,7 +236,7 @@ def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -
 def _bind_direction(
     used: UsedMessage, place: Place, config: DirectionCodes
 ) -> DirectionCodec | None:
-    """Bind the signal that carries the direction of a command."""
+    """Bind the signal with the direction of a command; None where it is missing."""
     at: Place = (*place, "signal")
     signal = used.integer(at, config.signal, key_path(at), signed=False)
     if signal is None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.inputs.value import MeasuredSignal
 from canshaper.machine.binding import load_deployment
 from tests.rigs.files import CONFIG, ROOT, problems, read
 from tests.rigs.overhead import FILE, changed
@@ -64,6 +65,23 @@ def test_a_signal_without_a_range_is_no_length(tmp_path: Path) -> None:
     ):
         (tmp_path / "own.dbc").write_text(dbc.replace(old, new), encoding="cp1252")
         assert any(says in problem for problem in problems(path))
+
+
+@pytest.mark.parametrize(("code", "m"), [("", 0), ("Virhe: value", 1.25), ("Virhe: fault", None)])
+def test_a_named_length_is_what_the_file_says(tmp_path: Path, code: str, m: object) -> None:
+    dbc = ROOT / "dbc" / "bridge-crane.dbc"
+    text = dbc.read_text(encoding="cp1252") + 'VAL_ 1040 RopeLength 500 "Virhe" 501 "Error" ;\n'
+    (tmp_path / "own.dbc").write_text(text, encoding="cp1252")
+    keys = ("signal: RopeLength,", f"signal: RopeLength, codes: {{ {code} }},")
+    path = changed(tmp_path, (str(dbc), "own.dbc"), keys)
+    if not code:
+        says = 'sway.length.codes to say whether 500 "Virhe" is a value (1.25 m) or a fault'
+        assert [says in problem for problem in problems(path)] == [True, True]
+        return
+    rope = load_deployment(path).axes["bridge"].rope
+    measured = MeasuredSignal(rope.signal, 0.5, 160.0) if rope else None
+    assert measured and measured.value({"RopeLength": 500}) == m
+    assert measured.value({"RopeLength": 501}) is None
 
 
 def test_a_filter_that_follows_no_rope_is_refused(tmp_path: Path) -> None:
