@@ -5,20 +5,28 @@ Only this module and ``signals.py`` read anything outside the gate, and they rea
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
-from canshaper.gate.checks import COUNTS, HEADERS, Checksum, Crc, E2e, crc_of
+from canshaper.gate.checks import HEADERS
 from canshaper.gate.fields import Field, openings_of
-from canshaper.gate.record import Axis, Joystick, Key, Message, Protection, Record, Switch, Valve
+from canshaper.gate.record import Axis, Joystick, Key, Message, Record, Switch, Valve
 from canshaper.gate.signals import (
     bits_of,
     command_of,
     field_of,
+    protection_of,
     rest_of,
-    signal_of,
     start_of,
     stick_of,
 )
+
+if TYPE_CHECKING:  # see signals.py
+    from cantools.database.can import Message as DbcMessage
+
+    from canshaper.config import crane, inputs, schema
+    from canshaper.machine.deployment import Deployment
+    from canshaper.machine.inputs import Bound
+    from canshaper.machine.valves import BoundAxis
 
 SLACK, SWING_SLACK = 0.4, 1.5
 """Slack of a filter that only spreads the demand, and of one that runs ahead of it, s of full
@@ -31,7 +39,7 @@ SENT = (0x18E8FF00, 0x18FECA00, 0x1CECFF00, 0x1CEBFF00)
 HEARTBEAT, NMT, START, WORDS = 0x700, 0x000, 1, frozenset((0x8, 0x9, 0xB, 0xF, 0x3))
 
 
-def record_of(deployment: Any) -> Record:
+def record_of(deployment: "Deployment") -> Record:
     """Return the gate's record of a deployment (``machine.Deployment``)."""
     config = deployment.config
     messages = {name: _message(name, one, config) for name, one in deployment.joysticks.items()}
@@ -42,9 +50,9 @@ def record_of(deployment: Any) -> Record:
         for switch, (signal, on) in bound.switches.items():
             switches[switch] = Switch(name, field_of(bound.message, signal), on)
     stop = None
-    if bound := deployment.emergency_stop:
-        messages["emergency stop"] = _message("emergency stop", bound, config)
-        stop = Switch("emergency stop", field_of(bound.message, bound.config.signal), 0)
+    if pressed := deployment.emergency_stop:
+        messages["emergency stop"] = _message("emergency stop", pressed, config)
+        stop = Switch("emergency stop", field_of(pressed.message, pressed.config.signal), 0)
     axes = {name: _axis(bound, deployment) for name, bound in deployment.axes.items()}
     for motion in config.motion.values():
         _add_motion(axes, motion, deployment)
@@ -63,7 +71,9 @@ def record_of(deployment: Any) -> Record:
     )
 
 
-def _message(name: str, bound: Any, config: Any) -> Message:
+def _message(
+    name: str, bound: "Bound[inputs.InputSection]", config: "schema.DeploymentConfig"
+) -> Message:
     section, message = bound.config, bound.message
     can_id = _from(message.frame_id, section.source)
     ids, group = frozenset((can_id,)), None
@@ -105,38 +115,7 @@ def _group(can_id: int) -> int:
     return 0x03FF0000 if (can_id >> 16) & 0xFF < 240 else 0x03FFFF00
 
 
-def protection_of(section: Any, message: Any, can_id: int) -> Protection:
-    """Return the protection of a message, from its section of the file."""
-    if one := section.e2e:
-        counts, ids = COUNTS.get(one.profile, 256), bytes(one.data_ids or ())
-        e2e = E2e(one.profile, counts, one.data_id or 0, one.data_id_mode or "", ids)
-        return Protection(e2e, counts=counts)
-    counter = field_of(message, section.alive_counter) if section.alive_counter else None
-    counts = counter.mask + 1 if counter else 0
-    of = section.checksum
-    check = _checksum(of, message, can_id) if of else None
-    return Protection(check, of is None or check is not None, counter, counts)
-
-
-def _checksum(section: Any, message: Any, can_id: int) -> Checksum | None:
-    """Return the checksum of a message; None for a kind that another package adds."""
-    signal, kind = signal_of(message, section.signal), section.kind
-    place, bits = bits_of(field_of(message, section.signal), message.length), signal.length
-    lowest = (place & -place).bit_length() - 1
-    order = "big" if signal.byte_order == "big_endian" and bits > 8 else "little"
-    where: Any = {"byte": lowest // 8, "shift": lowest % 8, "bits": bits, "order": order}
-    if kind is None:
-        crc = Crc(bits, section.polynomial, section.start, section.end, section.reflected)
-        return Checksum(crc, **where)
-    plus = {"sum": 0, "sum_id": sum(can_id.to_bytes(4, "little")), "sum_length": message.length}
-    if kind in plus:
-        return Checksum("sum", **where, plus=plus[kind])
-    named = ("crc8_sae_j1850", "crc8_autosar", "crc16_ccitt_false", "crc16_arc")
-    how: Any = crc_of(kind) if kind in named else {"xor": "xor", "sum4": "halves"}.get(kind)
-    return Checksum(how, **where) if how else None
-
-
-def _joystick(name: str, deployment: Any, switches: dict[str, Switch]) -> Joystick:
+def _joystick(name: str, deployment: "Deployment", switches: dict[str, Switch]) -> Joystick:
     bound = deployment.joysticks[name]
     enabling = []
     for number, (of, signal) in enumerate(bound.conditions):
@@ -152,12 +131,12 @@ def _joystick(name: str, deployment: Any, switches: dict[str, Switch]) -> Joysti
     return Joystick(name, pressed, tuple(others), reset, bypass, round(config.stuck_s * 1e9))
 
 
-def _axis(bound: Any, deployment: Any) -> Axis:
-    config, limits, find = bound.config, bound.config.limits, deployment.messages.find
+def _axis(bound: "BoundAxis", deployment: "Deployment") -> Axis:
+    config, limits = bound.config, bound.config.limits
     period_s = deployment.config.tick_ms * 1e-3 * bound.period_ticks
     joystick, valve = deployment.joysticks[config.command.joystick], config.valve
     forwarded = _forwarded(config, deployment)
-    rewritten, in_dbc = config.command if forwarded else None, find(valve.message)[1]
+    rewritten, in_dbc = config.command if forwarded else None, _in_dbc(deployment, valve.message)
     command = command_of(bound.valve_message, valve, rewritten, in_dbc)
     control, start = deployment.config.control, f"axes.{bound.name}."
     curve, tip = (limits.curve_command_pct, limits.curve_speed_pct), config.slewing
@@ -166,7 +145,9 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         name=bound.name,
         joystick=config.command.joystick,
         signal=config.command.signal,
-        stick=stick_of(joystick.message, config.command, find(joystick.config.message)[1]),
+        stick=stick_of(
+            joystick.message, config.command, _in_dbc(deployment, joystick.config.message)
+        ),
         valve=_valve_key(bound, deployment),
         command=command,
         openings=openings_of(limits.deadband_pct, curve, command.size.full),
@@ -186,11 +167,18 @@ def _axis(bound: Any, deployment: Any) -> Axis:
         full_m_s=config.sway.full_speed_m_s if config.sway else 1.0,
         stop_m=limits.stop_distance_m or math.inf,
         tip_m_s=tip.full_speed_rad_s * tip.largest_radius_m if tip else 0.0,
-        ranges={k.removeprefix(start): tuple(ends) for k, ends in ranges if k.startswith(start)},
+        ranges={k.removeprefix(start): (v[0], v[1]) for k, v in ranges if k.startswith(start)},
     )
 
 
-def slack_of(config: Any) -> float:
+def _in_dbc(deployment: "Deployment", name: str) -> "DbcMessage":
+    """Return a message as the DBC has it, without the corrections of the file."""
+    found = deployment.messages.find(name)
+    assert not isinstance(found, str)  # checked with the deployment
+    return found[1]
+
+
+def slack_of(config: "schema.AxisSection") -> float:
     """Return how far a filter may run ahead of the demand, full speed times seconds, or inf."""
     if config.limits.allow_faster or config.limits.allow_reverse:
         return math.inf
@@ -200,7 +188,7 @@ def slack_of(config: Any) -> float:
     return SLACK if one and not config.filter.runs_ahead else float(slow)
 
 
-def _forwarded(axis: Any, deployment: Any) -> bool:
+def _forwarded(axis: "schema.AxisSection", deployment: "Deployment") -> bool:
     """Return whether the command of an axis leaves in the frames of its own joystick."""
     gateway = deployment.config.gateway
     joystick = deployment.config.joysticks[axis.command.joystick]
@@ -208,7 +196,7 @@ def _forwarded(axis: Any, deployment: Any) -> bool:
     return bool(other) and (joystick.bus, joystick.message) == (other, axis.valve.message)
 
 
-def _valve_key(bound: Any, deployment: Any) -> Key:
+def _valve_key(bound: "BoundAxis", deployment: "Deployment") -> Key:
     bus, message = bound.config.valve.bus, bound.valve_message
     can_id, node = message.frame_id, deployment.config.buses[bus].j1939
     if message.protocol == "j1939":
@@ -219,7 +207,7 @@ def _valve_key(bound: Any, deployment: Any) -> Key:
     return bus, can_id, message.is_extended_frame
 
 
-def _add_motion(axes: dict[str, Axis], motion: Any, deployment: Any) -> None:
+def _add_motion(axes: dict[str, Axis], motion: "crane.Motion", deployment: "Deployment") -> None:
     slew, near_far = axes[motion.slew], axes[motion.near_far] if motion.near_far else None
     for axis in filter(None, (slew, near_far)):
         axis.added = motion.max_pct / 100.0
@@ -232,7 +220,7 @@ def _add_motion(axes: dict[str, Axis], motion: Any, deployment: Any) -> None:
         near_far.path = near_far.path_m / near_far.full_m_s
 
 
-def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
+def _valve(names: tuple[str, ...], deployment: "Deployment") -> Valve:
     bound = [deployment.axes[name] for name in names]
     first, message = bound[0], bound[0].valve_message
     valve, forwarded = first.config.valve, _forwarded(first.config, deployment)
@@ -273,13 +261,15 @@ def _valve(names: tuple[str, ...], deployment: Any) -> Valve:
     return Valve(*frame, tuple(own), field_of(message, enable))
 
 
-def _others(deployment: Any) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
+def _others(
+    deployment: "Deployment",
+) -> Iterator[tuple[Key, tuple[frozenset[int], frozenset[bytes]]]]:
     """Yield (key, (lengths, contents; empty: any)) of status messages and those of our nodes."""
     anything, config = frozenset[bytes](), deployment.config
     of_axes = (one.status for one in config.axes.values())
     aims = (one.aim for one in config.motion.values())
     for status in filter(None, (config.status, config.identity, *of_axes, *aims)):
-        message, node = deployment.messages.find(status.message)[1], config.buses[status.bus].j1939
+        message, node = _in_dbc(deployment, status.message), config.buses[status.bus].j1939
         source = node.address if message.protocol == "j1939" and node else None
         key = status.bus, _from(message.frame_id, source), message.is_extended_frame
         yield key, (frozenset(range(message.length, 65)), anything)

@@ -3,10 +3,11 @@
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
-Frame = Any
-"""A frame, of which this module only uses the bus, ``frame.bus``."""
+if TYPE_CHECKING:  # for the checker of types only: nothing of it is loaded with the gate
+    from canshaper.codec.frame import Frame
+    from canshaper.machine.deployment import Deployment
 
 # Time since the machine was booted, ns. No one can set it, and unlike CLOCK_MONOTONIC it goes on
 # while the machine is suspended: an age, and a standstill of the loop, includes that time. Other
@@ -60,7 +61,7 @@ LEAST_LEAVE_NS = 10_000_000
 NEVER_NS = 1 << 63  # later than any time of a clock
 
 
-def longest_gap_ns(deployment: Any) -> int:
+def longest_gap_ns(deployment: "Deployment") -> int:
     """Return the longest time between two ticks, in ns, after which an axis may continue to move.
 
     After the shortest age limit of an input, frames that wait in the sockets must not look fresh.
@@ -80,7 +81,7 @@ def longest_gap_ns(deployment: Any) -> int:
 class Standstill:
     """Finds whether a loop stood still too long since its last tick, or that before a reload."""
 
-    def __init__(self, deployment: Any, before: "Standstill | None" = None) -> None:
+    def __init__(self, deployment: "Deployment", before: "Standstill | None" = None) -> None:
         # The time when a frame is about to leave; a test may replace it.
         self.clock: Callable[[], int] = boottime_ns
         self.limit_ns = longest_gap_ns(deployment)
@@ -116,19 +117,19 @@ class FrameProcessor(Protocol):
     def moves(self) -> bool:
         """Whether the frame handed out last is a valve's, and an axis run in its tick moves."""
 
-    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
+    def receive(self, frame: "Frame", arrived_ns: int) -> "Frame | None":
         """Receive a frame; return the frame for the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
         """Take note that the loop stood still: frames up to the next tick have waited."""
 
-    def tick(self, now_ns: int, missed: int) -> Iterator[Frame]:
+    def tick(self, now_ns: int, missed: int) -> "Iterator[Frame]":
         """Run one tick, and yield the frames to send now."""
 
-    def send_failed(self, frame: Frame) -> None:
+    def send_failed(self, frame: "Frame") -> None:
         """Take note that a frame did not reach its bus."""
 
-    def withhold(self, frame: Frame) -> bool:
+    def withhold(self, frame: "Frame") -> bool:
         """Return whether a late valve frame moves a valve, and so must not leave."""
 
 
@@ -139,13 +140,13 @@ class FramePort(Protocol):
     def arrived_ns(self) -> int:
         """Arrival of the frame that ``frames`` has just handed out."""
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> "Iterator[Frame]":
         """Yield every frame that waits, in order."""
 
-    def background(self) -> Iterator[Frame]:
+    def background(self) -> "Iterator[Frame]":
         """Yield frames that can wait until the valves have their commands."""
 
-    def send(self, frame: Frame) -> bool:
+    def send(self, frame: "Frame") -> bool:
         """Send a frame now or not at all; return whether it was sent."""
 
 

@@ -10,9 +10,10 @@ from canshaper.checksums.kinds import CHECKSUMS, Checksum, crc_kind
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
 from canshaper.config.inputs import Protected
 from canshaper.gate import checks
-from canshaper.gate.build import protection_of, record_of
+from canshaper.gate.build import record_of
 from canshaper.gate.checks import crc_of
 from canshaper.gate.record import Protection
+from canshaper.gate.signals import protection_of
 from tests.gate.bench import load
 from tests.gate.test_decoder import message
 
