@@ -44,7 +44,7 @@ class Adjuster:
             values: new numbers by their keys, as in the file's ``adjustable``.
 
         Returns:
-            A line for the log for each number that has changed.
+            A line for the log for each number, also an equal one, with its value before.
 
         Raises:
             ValueError: a number is refused; the text says what was expected and what came. No

@@ -120,7 +120,7 @@ class Gate:
         self.valves[key].count = self.valves[key].before
 
     def set(self, key: str, value: float) -> None:
-        """Change a number by its key axes.NAME.SECTION.KEY, clamped to its range in the file."""
+        """Take over the number of a key axes.NAME.SECTION.KEY, and a new filter of its axis."""
         name, section, last = key.rsplit(".", 2)
         axis = self.axes[name.removeprefix("axes.")]
         axis.of.set(f"{section}.{last}", value)

@@ -126,7 +126,7 @@ class Axis:
         return -self.openings[1].velocity(-steps) if steps else 0.0
 
     def set(self, key: str, value: float) -> None:
-        """Change a number, clamped to its range in the file; a number without a range stays."""
+        """Change a limit or ``full_m_s``, clamped to its range in the file; all else stays."""
         if key not in self.ranges or math.isnan(value):
             return
         low, high = self.ranges[key]

@@ -278,7 +278,7 @@ def check_following(
 
 
 def follow_fault(config: DeploymentConfig, joystick: BoundJoystick) -> str | None:
-    """Return why the ticks cannot follow a joystick, or None."""
+    """Return why the ticks cannot follow a joystick, to be followed by "of NAME"; or None."""
     bus = config.buses.get(joystick.config.bus)
     if bus is not None and bus.interface != "socketcan":
         return f"expected a bus of socketcan, which stamps frames, got {bus.interface}, the bus"
