@@ -174,7 +174,8 @@ class ProfileSwitch:
     def name(self, now_ns: int) -> str:
         """Return the name of the code; "" for any other code, and while it is silent."""
         code = self._value.fresh(now_ns)
-        return "" if code is None else self._names.get(code, "")
+        # Scale and offset of the signal may leave a trace of rounding.
+        return "" if code is None else self._names.get(round(code, 6), "")
 
 
 class ProfileButtons:

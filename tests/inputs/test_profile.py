@@ -20,7 +20,9 @@ class Display:
         return self.code
 
 
-@pytest.mark.parametrize(("code", "name"), [(1.0, "quick"), (2.0, "fine"), (3.0, ""), (None, "")])
+@pytest.mark.parametrize(
+    ("code", "name"), [(1.0, "quick"), (519 * 0.1 + 0.1 - 50.0, "fine"), (3.0, ""), (None, "")]
+)
 def test_a_code_that_names_none_and_silence_are_the_own_filter(
     code: float | None, name: str
 ) -> None:
