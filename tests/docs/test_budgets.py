@@ -19,8 +19,8 @@ MORE = 1.05  # a page may exceed its budget by so much before it has to be short
 TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->$", re.M | re.S)
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
-    "CHANGELOG.md": 630,
-    "CONTRIBUTING.md": 540,
+    "CHANGELOG.md": 610,
+    "CONTRIBUTING.md": 580,
     "README.md": 570,
     "SECURITY.md": 340,
     "docs/api.md": 130,
@@ -51,7 +51,7 @@ BUDGET = {
     "docs/states.md": 270,
     "docs/studio.md": 600,
     "docs/study.md": 280,
-    "docs/testing.md": 440,
+    "docs/testing.md": 420,
     "docs/topologies.md": 640,
     "docs/troubleshooting.md": 530,
     "docs/tuning.md": 550,
@@ -61,10 +61,10 @@ BUDGET = {
 
 # Lines of Python with room for small additions, and why so many.
 LINES = {
-    "canshaper/gate": (2_200, "read in a day by someone who has never seen it"),
+    "canshaper/gate": (2_250, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (5_000, "the method: filters, axis, motion, ends, observer of the sway"),
     "canshaper": (67_000, "a new ability takes the room of an old one"),
-    "tests": (100_000, "one level for each behaviour"),
+    "tests": (100_500, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.
 FILES = {"canshaper": (332, "one that only hands on is joined to its reader")}
