@@ -158,7 +158,7 @@ class DriveError(DesignError):
 
 
 class NativeError(CanshaperError):
-    """The controller in C cannot be compiled here, or its arithmetic is another one."""
+    """The controller in C cannot be compiled here, or computes otherwise than Python."""
 
 
 class CampaignError(CanshaperError):

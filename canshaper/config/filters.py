@@ -219,7 +219,8 @@ def filter_of(kind: str, **parameters: Any) -> Filter:
     """Return the section of a filter, as in a deployment file.
 
     Raises:
-        ValidationError: a file with this filter would be refused.
+        ValidationError: a file with these parameters would be refused.
+        KeyError: there is no filter of this kind.
     """
     return SECTIONS[kind].model_validate({"kind": kind, **parameters})
 

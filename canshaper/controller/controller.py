@@ -288,7 +288,7 @@ class Controller:
         return self.valves.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
-        """Return neutral frames to send last: none on silent buses, nor where a gateway rests."""
+        """Return neutral frames to send last: none on silent buses, of a gateway only in motion."""
         errors: list[Exception] = []
         for protocol in self._protocols:
             try:

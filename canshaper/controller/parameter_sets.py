@@ -161,7 +161,7 @@ class SetChooser:
 
 
 def profile_by_number(bound: BoundAxis) -> list[str]:
-    """Return the name of the profile of each parameter set, in their order; [] without profiles."""
+    """Return the profile of each parameter set, "" for the own filter; [] without profiles."""
     if not bound.config.profiles:
         return []
     return [name for name, (_, sets) in programs(bound).items() for _ in range(1 + len(sets))]

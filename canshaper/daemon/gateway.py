@@ -38,7 +38,7 @@ class Bridge:
     Args:
         buses: the two buses of SocketCAN.
         excluded: patterns of the frames that do not pass.
-        on_fault: called for every frame that could not be passed on.
+        on_fault: called for every frame that was read and could not be sent.
 
     Raises:
         BusError: an interface cannot be opened.

@@ -113,13 +113,15 @@ class Edit:
         indent = " " * int(self._pairs[0][0].start_mark.column)
         between = ", " if self._flow else self._newline + indent
         text = between.join(f"{key}: {value}" for key, value in pairs)
+        gone = sorted(self._removed[1:] if text else self._removed)
         for i in self._removed:
             start, end = self._pairs[i][0].start_mark.index, self._span(self._pairs[i][1])[1]
             if text:
                 self._spans.append((start, end, text))
                 text = ""
             elif self._flow:
-                self._spans.append((*self._with_comma(i, start, end), ""))
+                first = next((n for n, j in enumerate(gone) if n != j), len(gone)) - 1
+                self._spans.append((*self._with_comma(i, start, end, max(first, 0)), ""))
             else:
                 self._spans.append((*self._with_line(start, end), ""))
         if text:
@@ -145,13 +147,13 @@ class Edit:
             end = self._span(last[1] if isinstance(last, tuple) else last)[1]
         return start, end
 
-    def _with_comma(self, i: int, start: int, end: int) -> tuple[int, int]:
-        """Return the span of a pair in a flow mapping with its comma."""
-        if i > 0:
+    def _with_comma(self, i: int, start: int, end: int, first: int) -> tuple[int, int]:
+        """Return the span of a pair in a flow mapping with its comma; up to ``first`` all go."""
+        if i > first:
             start = self._span(self._pairs[i - 1][1])[1]
             between = self._text[start : self._pairs[i][0].start_mark.index]
         else:
-            following = self._pairs[1][0].start_mark.index if len(self._pairs) > 1 else end
+            following = self._pairs[i + 1][0].start_mark.index if i + 1 < len(self._pairs) else end
             between, end = self._text[end:following], following
         if "#" in between:
             raise self._error(self._pairs[i][0], "a comment stands next to it; change it by hand")

@@ -174,7 +174,7 @@ class AxisState(AxisInput):
         self.back.note(-now if now < 0.0 else 0.0, forth - distance, period, of)
 
     def change_filter(self) -> None:
-        """Let the output keep its velocity for BLEND_S, as another filter, or none, takes over."""
+        """Allow the way of ``last`` in BLEND_S more: another filter, or none, takes over."""
         (self.forth if self.last > 0.0 else self.back).remaining += abs(self.last) * BLEND_S
 
     def dropped(self, made: int) -> float:

@@ -86,7 +86,7 @@ def bit_of(signal: Signal, number: int) -> Signal:
 
 
 def _cut(signal: Signal, bits: Mapping[str, set[int]]) -> list[Signal]:
-    """Return the named bits of a signal as signals, or the signal itself if none is named."""
+    """Return the named bits of a signal as signals; itself if it is a float or has none of them."""
     numbers = sorted(n for n in bits.get(signal.name, ()) if n < signal.length)
     return [bit_of(signal, n) for n in numbers] if numbers and not signal.is_float else [signal]
 

@@ -144,7 +144,7 @@ class DbcText:
 
     @property
     def statements(self) -> int:
-        """Number of statements that belong to messages, definitions included."""
+        """Number of statements on messages and signals, and of value tables."""
         return len(self._starts)
 
     def without_type(self) -> set[int]:

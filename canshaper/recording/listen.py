@@ -47,7 +47,8 @@ class ReceivedFrame(NamedTuple):
     """One frame, as it was received.
 
     Attributes:
-        time_ns: wall clock, taken by the kernel if it can.
+        time_ns: wall clock, of the kernel if it can; of python-can the stamp of its interface; of a
+            simulated or replayed frame its time in the drive.
         bus: name of the bus in the deployment.
         channel: channel of the bus.
         can_id: id, with the error flag of SocketCAN for an error frame.

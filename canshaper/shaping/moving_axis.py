@@ -76,7 +76,7 @@ class MovingAxis:
         self.lag_s = 2.0 * ratio / omega
 
     def held(self, seconds: float) -> None:
-        """Add to ``reached`` the way of ``added`` in seconds without a step."""
+        """Move ``reached`` on by ``added``, which the valve held for ``seconds`` without a step."""
         self.reached += self.added * self.full_speed * seconds
 
     def path(self, after_s: float) -> GrapplePath:

@@ -125,7 +125,7 @@ def pairs_table(persons: Mapping[str, Rows], names: Mapping[str, str]) -> Table:
     """Return a table with a row for each pair of settings: changes within persons, by bootstrap.
 
     Args:
-        persons: rows of each person; at least three persons.
+        persons: rows of each person, at least three; each with rows that count of every setting.
         names: names of the settings, by letter.
     """
     level = f"{100 * CONFIDENCE:.0f} %"

@@ -237,3 +237,19 @@ def test_a_file_changed_meanwhile_is_left_alone(
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="No such file"):
         change(tmp_path / "none.yaml", [(SLEW, NEW, "")])
+
+
+@pytest.mark.parametrize(
+    ("removed", "left"),
+    [
+        ("ab", "{ c: 3 }"),
+        ("ba", "{ c: 3 }"),
+        ("abc", "{ }"),
+        ("ac", "{ b: 2 }"),
+        ("bc", "{ a: 1 }"),
+    ],
+)
+def test_keys_of_a_flow_mapping_go_with_their_commas(removed: str, left: str) -> None:
+    values: dict[str, FileValue] = dict.fromkeys(removed)
+    text = edited("x: { a: 1,   b: 2, c: 3 }\n", ("x",), values, "file", "")
+    assert yaml.safe_load(text) == yaml.safe_load(f"x: {left}\n")

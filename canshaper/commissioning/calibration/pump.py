@@ -178,7 +178,9 @@ def pair_of(deployment: Deployment, axes: Sequence[str]) -> tuple[str, ...]:
 def pump_lines(
     deployment: Deployment, axes: Sequence[str], drives: Drives, origin: dict[str, Any] | None
 ) -> list[str]:
-    """Return lines on the pump; with an origin write a flow that is too little for both axes.
+    """Return the flow of the pump as lines, from drives of two axes: each alone, and both at once.
+
+    A flow that is too little for both is written into the file, if there is an ``origin`` for it.
 
     Raises:
         CalibrationError: see ``measured``.

@@ -185,7 +185,7 @@ class SpeedFeedback:
 
     @property
     def value(self) -> float:
-        """The last valid speed, in the unit of the DBC."""
+        """The last valid speed, in the unit of the DBC; 0 before there is one, see ``valid``."""
         return self._input.value
 
     def valid(self, now_ns: int) -> bool:

@@ -188,7 +188,13 @@ def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
 
 
 def rule(new: str, device: Device, root: Path = ROOT) -> str:
-    """Return the udev rule that names a device; it has to run after 75-net-description.rules."""
+    """Return the udev rule that names a device by its serial number, or else by its path.
+
+    It needs one of the two, and has to run after 75-net-description.rules.
+
+    Raises:
+        OSError: the interface of an adapter with several channels is gone.
+    """
     parts = ['SUBSYSTEM=="net"', 'ACTION=="add"']
     if device.serial:
         parts.append(f'ATTRS{{serial}}=="{device.serial}"')

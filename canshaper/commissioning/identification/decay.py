@@ -234,7 +234,10 @@ def swing_values(omega: float, sigma: float) -> tuple[float, float]:
 
 
 def deviations(x: Array, covariance: Array) -> tuple[float, float]:
-    """Return the deviations of period (s) and damping ratio, by frequency, decay, covariance."""
+    """Return the standard deviations of period (s) and damping ratio.
+
+    ``x`` begins with frequency (rad/s) and decay (1/s); ``covariance`` is that of ``x``.
+    """
     omega, sigma = float(x[0]), float(x[1])
     cube = math.hypot(omega, sigma) ** 3
     slopes = np.array([[-2.0 * math.pi / omega**2, 0.0], [-sigma * omega / cube, omega**2 / cube]])

@@ -131,7 +131,7 @@ def screen(
 
 
 def _events(monitor: Monitor, only: str | None, width: int) -> list[Text]:
-    """Return the changes of everything, or of the one axis that is shown."""
+    """Return the events as lines wrapped to ``width``, of axis ``only`` if there is one."""
     shown = [e for e in monitor.events if only is None or f"axis={only} " in f"{e.text} "]
     lines = (Text(f"{clock(event.time_ns)} {event.text}") for event in shown)
     return [part for line in lines for part in _wrapped(line, width)]

@@ -27,7 +27,10 @@ from canshaper_sim.strokes import Script
 
 
 class _Releasing(JoystickNode):
-    """An operator who lets go of the enable switch for a while, and holds the joystick."""
+    """An operator who follows the script, but lets go of the enable switch for a while.
+
+    Meanwhile anti-sway is on, even with ``bypass``.
+    """
 
     def __init__(
         self, deployment: Deployment, script: Script, bypass: bool, released: tuple[float, float]

@@ -71,8 +71,8 @@ def setting(
 def deployed(tuning: Tuning, mode: SwayMode, tick_s: float, machine: Machine) -> Setting:
     """Return the tuning with its values rounded as in a file, measured with these values.
 
-    a2 and a1 are rounded up and the third pole towards zero, so that neither a pole turns complex
-    nor the first jump grows.
+    a2 and a1 are rounded up, so that no pole turns complex. The third pole becomes slower, so that
+    the first jump does not grow, but for half a unit of its last digit.
     """
     a2 = _up(tuning.a2)
     a1 = _up(max(tuning.a1, 2.0 * math.sqrt(a2)))

@@ -127,7 +127,7 @@ def _driven_s(axis: AxisTraffic) -> float:
 
 
 def _measured(context: Context, outcome: Outcome, raw: Recording, shaped: Recording) -> None:
-    """Print, judge and draw the total swing of both drives."""
+    """Print the report of both drives, judge the swing that is left, note the figure to draw."""
     measures = report_dict(
         raw,
         shaped,
