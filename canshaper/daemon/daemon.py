@@ -56,8 +56,7 @@ class Daemon:
 
     Raises:
         ConfigError: the deployment is not valid.
-        BusError: a bus cannot be opened. Under a service manager the daemon waits for its buses
-            instead, but not for the sockets by which it forwards the other frames of a gateway.
+        BusError: a bus cannot be opened, or a gateway's socket; for a bus a service waits instead.
     """
 
     def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
@@ -255,8 +254,8 @@ class Daemon:
         """Send every valve neutral; ``wait`` a moment until the frames are on their buses.
 
         Returns:
-            ``not-sent`` if the gate refused a frame, one was not sent, or we only listen; else
-            ``sent``, or after a wait see ``seen_sent``.
+            ``not-sent`` if a frame was refused or not sent, or we only listen; else ``sent``, or
+            after a wait what ``seen_sent`` says.
 
         Raises:
             Exception: a neutral frame could not be made; all others were sent first.
@@ -272,9 +271,8 @@ class Daemon:
             return "not-sent"
         if not wait:
             return "sent"
-        return seen_sent(
-            self._ports.values(), lambda frame: self._recorder.receive(frame, boottime_ns())
-        )
+        recorder = self._recorder
+        return seen_sent(self._ports.values(), lambda one: recorder.receive(one, boottime_ns()))
 
     def _send_identity(self) -> None:
         """Send the digest of program and deployment, if the file has a message for it."""
