@@ -151,8 +151,9 @@ def _text(deployment: Deployment) -> tuple[list[str], str]:
             names.append(str(FOLDER / inside))
             moved[name] = os.path.relpath(root / inside, file.parent)
         else:
+            moved[name] = name
             names.append(str(Path(FOLDER) / source.relative_to(root)))
-    if moved:  # all at once, the longest first: one path may be a part of another
+    if len(relative) < len(sources):  # all at once, the longest first: one path may be in another
         paths = "|".join(map(re.escape, sorted(moved, key=len, reverse=True)))
         text = re.sub(paths, lambda found: moved[found[0]], text)
     return names, text

@@ -64,10 +64,12 @@ class UnderWay:
     Attributes:
         counts: number of frames by id with its flags.
         claims: address claims as ``CAN_FRAME`` unpacks them; the first socket receives them back.
+        dropped: ids of which frames were no longer counted, and none was confirmed since.
     """
 
     def __init__(self) -> None:
         self.counts: dict[int, int] = {}
+        self.dropped: set[int] = set()
         self.claims: deque[Any] = deque(maxlen=MOST_CLAIMS)
         self._since_ns: dict[int, int] = {}
 
@@ -84,6 +86,7 @@ class UnderWay:
     def confirmed(self, word: int) -> None:
         """Take note that one frame of an id is on the bus."""
         self.counts[word] = max(0, self.counts.get(word, 0) - 1)
+        self.dropped.discard(word)
         self._since_ns.pop(word, None)
 
     def restart(self, word: int) -> None:
@@ -93,6 +96,7 @@ class UnderWay:
 
     def clear(self) -> None:
         """Count the frames of every id from 0; ``claims`` lists its frames one by one and stays."""
+        self.dropped |= {word for word, count in self.counts.items() if count}
         self.counts.clear()
         self._since_ns.clear()
 

@@ -198,12 +198,11 @@ class RawPort(Interface):
 
     @property
     def confirmed(self) -> bool | None:
-        """Whether all valve frames sent are on a working bus; None if the bus does not say."""
+        """Whether all valve frames sent are on the bus; None if the bus does not say."""
         if not self._confirms:
             return None
-        # Of the frames that a silent bus has dropped, no count is left.
-        waits = any(self._unconfirmed.get(word) for word in self._valves)
-        return not waits and self.state not in SILENT
+        counts, dropped = self._unconfirmed, self._under_way.dropped
+        return not any(counts.get(word) or word in dropped for word in self._valves)
 
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment, with its name of the bus and its messages."""

@@ -143,8 +143,10 @@ class AxisState(AxisInput):
         if self.last and number - self.sent_at > of.silent:  # its valve has closed by itself
             self.last, self.top, self.high, self.zero_at = 0.0, of.step, of.step, made
         left = self.stop_left - passed if self.stop_left > passed else 0
-        if why:
-            self.halt(why, made, cause, latch=latches or self.last != 0.0)
+        if not why and self.joystick.pressed.press > self.cause:
+            self.latched = False
+        if why:  # as long as it lasts, no press ends a latch
+            self.halt(why, made, cause, latch=self.latched or latches or self.last != 0.0)
         elif demand is None:
             self.stop_left = of.stop if self.armed else left
             self.armed, self.why = False, "joystick"
@@ -153,8 +155,7 @@ class AxisState(AxisInput):
             self.now = demand if self.armed else 0.0
         else:
             self.stop_left = 0
-            if not self.latched or self.joystick.pressed.press > self.cause:
-                self.latched, self.armed = False, True
+            self.armed = self.armed or not self.latched
         self.hard, self.latches, self.lost = "", False, False
         self._ask(before, number // of.period, passed)
 

@@ -115,9 +115,10 @@ class Received:
         self.intact_ns = NEVER if missed else before.intact_ns
         if self.of.protection == before.of.protection:
             self.count, self.any_count, self.good = before.count, before.any_count, before.good
-        released = {(one.of.field, one.of.on) for one in before.switches if one.released}
+        released = {(s.of.field, s.of.on): s.was_off for s in before.switches if s.released}
         for switch in self.switches:
-            switch.released = switch.was_off = (switch.of.field, switch.of.on) in released
+            key = switch.of.field, switch.of.on
+            switch.released, switch.was_off = key in released, released.get(key, False)
 
 
 class SwitchState:
@@ -130,7 +131,7 @@ class SwitchState:
         self.emergency = emergency  # an emergency stop, which latches at rest too
         self.on = False  # whether it is on in the last frame that counts
         self.released = False  # set by any frame that says so, cleared only by one that counts
-        self.was_off = False  # whether it was seen released since its last press
+        self.was_off = False  # whether a frame that counts released it since its last press
         self.press = NEVER  # number of the frame with its last press, or with that of reset
 
     def take(self, word: Word, number: int, *, counts: bool, stood: bool) -> None:
@@ -141,7 +142,7 @@ class SwitchState:
         if counts:
             self.on = on
         if raw == 0 if of.only_zero else not on:
-            self.released = self.was_off = True
+            self.released, self.was_off = True, self.was_off or counts
             why = "emergency stop" if self.emergency else "enable"
             for axis in self.axes:
                 axis.stop(why, number, latches=self.emergency)

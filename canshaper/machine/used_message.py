@@ -227,7 +227,7 @@ class UsedMessage:
                 self.add_fault(f"{signal.name}: GenSigStartValue: {text} {unit}".rstrip())
 
     def check_errors(self, signal: Signal) -> None:
-        """Check that no error code of J1939 is read as a measurement."""
+        """Check that no error code of J1939 is a measurement, or a command."""
         if is_j1939(self.message):
             self.add_fault(j1939_fault(signal))
 

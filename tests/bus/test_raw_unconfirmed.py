@@ -88,6 +88,13 @@ def test_a_valve_frame_that_the_bus_has_lost_is_never_confirmed(line: Line, end:
         line.put(message(0x110))
     line.received()
     assert line.port.confirmed is False
+    line.error(RESTARTED)  # it is gone, though the bus is back
+    line.received()
+    assert line.port.confirmed is False
+    line.port.send(VALVE)
+    line.confirm(VALVE)
+    line.received()
+    assert line.port.confirmed
 
 
 # -- carrier and name ------------------------------------------------------------------------------

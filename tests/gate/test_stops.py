@@ -115,6 +115,40 @@ class TestStopsAtOnce:
         one.rests(2, reset=True)
         assert one.axis.armed
 
+    def test_a_press_while_the_reason_lasts_is_no_reset(self) -> None:
+        """At rest a lost emergency stop would latch nothing: it keeps what it latched in motion."""
+        one = Bench(variants.machine("protected")[1], "near_far")
+        stop = one.deployment.emergency_stop
+        assert stop is not None
+        one.rests(10)
+        for steps in range(1, 20):
+            assert not one.sends(steps, near_far=1.0)
+        one.change = lambda frame: None if frame[:3] == stop.key else frame
+        while not one.sends(19, near_far=1.0):
+            assert one.number < 100
+        one.rests(10)
+        assert one.axis.latched
+        one.rests(3, enable=False)
+        one.rests(3)
+        one.change = lambda frame: frame
+        one.rests(10)
+        assert not one.axis.armed
+        one.rests(3, enable=False)
+        one.rests(1)
+        assert one.axis.armed
+
+    def test_a_press_that_counted_stays_one(self) -> None:
+        """A reason at rest behind it, which latches nothing, asks for neutral alone."""
+        one = self.moving()
+        one.gate.send_failed(one.key)
+        one.rests(1)
+        one.receive(one.joysticks(reset=True, near_far=1.0))
+        one.sent(0)
+        one.gate.disagrees([one.axis])
+        one.sends(0, near_far=1.0)
+        one.rests(1)
+        assert one.axis.armed
+
     def test_a_press_just_after_it_is_one(self) -> None:
         one = self.moving()
         one.gate.send_failed(one.key)

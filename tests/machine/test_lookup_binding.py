@@ -104,12 +104,20 @@ ERRORS = "expected a range that ends before the error codes of J1939,"
                 for n in range(3)
             },
         ),
+        (
+            [("PortFlow : 0|8@1+ (0.4,0) [0|100]", "PortFlow : 0|8@1+ (0.4,0) [0|102]")],
+            {
+                f"AVC{n}: PortFlow: {ERRORS} 254 to 255, or names for them (VAL_), got [0|102]:"
+                " 254 would be 101.6 %"
+                for n in range(3)
+            },
+        ),
     ],
 )
 def test_an_error_of_j1939_is_no_measurement(
     tmp_path: Path, changes: list[tuple[str, str]], says: set[str]
 ) -> None:
-    """All bits 1, not available, would otherwise be full speed."""
+    """All bits 1, not available, would otherwise be full speed; nor is it a command."""
     assert set(changed(tmp_path, J1939, *changes).faults()) == says
 
 

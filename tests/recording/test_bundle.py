@@ -79,6 +79,20 @@ def test_files_of_one_name_in_two_folders_stay_two(machine: Path, tmp_path: Path
     assert load_deployment(file).identity.content == before
 
 
+def test_a_relative_path_that_holds_an_absolute_one_stays(machine: Path, tmp_path: Path) -> None:
+    first = tmp_path / "d" / "forwarder.dbc"
+    second = Path(f"{machine.parent / 'e'}{first}")
+    for path in (first, second):
+        path.parent.mkdir(parents=True)
+    shutil.move(tmp_path / "here" / "dbc" / "forwarder.dbc", first)
+    second.write_text('VERSION ""\nBU_: A\nBO_ 1000 Other: 8 A\n SG_ S : 0|8@1+ (1,0) [0|1] "" A\n')
+    text = machine.read_text()
+    machine.write_text(text.replace("../dbc/forwarder.dbc", f"e{first}, {first}"))
+    before = load_deployment(machine).identity.content
+    _, file = unpack(packed(machine, tmp_path), tmp_path / "there")
+    assert load_deployment(file).identity.content == before
+
+
 def test_what_else_is_in_it(machine: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(packed(machine, tmp_path)) as bundle:
         about = json.loads(bundle.read("about.json"))
