@@ -193,7 +193,8 @@ def test_neutral_first() -> None:
                 both(stops, either(latches, start[3] != 0.0), sent_at >= 1000 - of.silent),
                 axis.latched,
             ),
-            implies(both(start[1], no(both(neutral, pressed))), axis.latched),
+            # A latch ends by a press behind its cause alone, and not while a reason lasts.
+            implies(both(start[1], no(both(no(stops), pressed))), axis.latched),
             # A shaped stop ends: it begins with stop_s, where the axis was armed, and shrinks.
             implies(no(start[0]), axis.stop_left <= most(start[2] - passed, 0)),
             axis.stop_left <= most(of.stop, start[2]),
