@@ -130,8 +130,8 @@ class RopeLength:
         if last is not None and measured_m != last:
             # The rope may run all the time that its length is lost: the length before says less
             # and less, and nothing once this way is longer than the rope.
-            elapsed_s = min(self._since_s, MOST_SILENT_S) + self._lost_s
-            way = MOST_M_S * elapsed_s + ROUNDING_M
+            ran_s = min(self._since_s, MOST_SILENT_S) + self._lost_s
+            way = MOST_M_S * ran_s + ROUNDING_M
             self._since_s = 0.0
             if abs(measured_m - last) > way:
                 self._settles_s = SETTLES_S

@@ -93,9 +93,10 @@ class Daemon:
         log.info("memory=%s", f"not-locked ({why})" if (why := lock_memory()) else "locked")
         self._collector.freeze()
         # Most valves accept other commands only after a neutral one.
-        valves, path = self._send_neutral(wait=True), self._controller.deployment.path
+        valves = self._send_neutral(wait=True)
         self._black_box.begin(boottime_ns())
-        log.info("started file=%s axes=%s valves=%s", path, names, valves)
+        file = self._controller.deployment.path
+        log.info("started file=%s axes=%s valves=%s", file, names, valves)
         self._reporter.identity()
         self._manager.ready(f"started, axes {names}")
         try:

@@ -113,15 +113,15 @@ class Edit:
         indent = " " * int(self._pairs[0][0].start_mark.column)
         between = ", " if self._flow else self._newline + indent
         text = between.join(f"{key}: {value}" for key, value in pairs)
-        gone = sorted(self._removed[1:] if text else self._removed)
+        gone = self._removed[1:] if text else self._removed
+        first_kept = next((i for i in range(len(self._pairs)) if i not in gone), len(self._pairs))
         for i in self._removed:
             start, end = self._pairs[i][0].start_mark.index, self._span(self._pairs[i][1])[1]
             if text:
                 self._spans.append((start, end, text))
                 text = ""
             elif self._flow:
-                first = next((n for n, j in enumerate(gone) if n != j), len(gone)) - 1
-                self._spans.append((*self._with_comma(i, start, end, max(first, 0)), ""))
+                self._spans.append((*self._with_comma(i, start, end, begins=i < first_kept), ""))
             else:
                 self._spans.append((*self._with_line(start, end), ""))
         if text:
@@ -147,14 +147,17 @@ class Edit:
             end = self._span(last[1] if isinstance(last, tuple) else last)[1]
         return start, end
 
-    def _with_comma(self, i: int, start: int, end: int, first: int) -> tuple[int, int]:
-        """Return the span of a pair in a flow mapping with its comma; up to ``first`` all go."""
-        if i > first:
-            start = self._span(self._pairs[i - 1][1])[1]
-            between = self._text[start : self._pairs[i][0].start_mark.index]
-        else:
+    def _with_comma(self, i: int, start: int, end: int, *, begins: bool) -> tuple[int, int]:
+        """Return the span of a pair in a flow mapping with the comma before it.
+
+        Of pairs that no kept one stands before (``begins``), it is the comma behind.
+        """
+        if begins:
             following = self._pairs[i + 1][0].start_mark.index if i + 1 < len(self._pairs) else end
             between, end = self._text[end:following], following
+        else:
+            start = self._span(self._pairs[i - 1][1])[1]
+            between = self._text[start : self._pairs[i][0].start_mark.index]
         if "#" in between:
             raise self._error(self._pairs[i][0], "a comment stands next to it; change it by hand")
         return start, end

@@ -105,15 +105,15 @@ class AxisState(AxisInput):
         # a pause resets neither.
         self.way, self.alone = 0.0, 0
 
-    def halt(self, why: str, made: int, cause: int = NEVER, *, latch: bool) -> None:
+    def halt(self, why: str, made: int, cause: int | None = None) -> None:
         """Stop the axis at once: no velocity may leave from now on.
 
-        ``latch`` as after a trip: until a press in a frame after the one of number ``cause``.
+        With a ``cause`` it latches, as after a trip: until a press in a frame behind that number.
         """
         if self.armed or self.last:
             self.zero_at = made
         self.armed, self.stop_left, self.why = False, 0, why
-        if latch:
+        if cause is not None:
             self.latched, self.cause = True, cause
         self.forth.forget()
         self.back.forget()
@@ -146,7 +146,7 @@ class AxisState(AxisInput):
         if not why and self.joystick.pressed.press > self.cause:
             self.latched = False
         if why:  # as long as it lasts, no press ends a latch
-            self.halt(why, made, cause, latch=self.latched or latches or self.last != 0.0)
+            self.halt(why, made, cause if self.latched or latches or self.last != 0.0 else None)
         elif demand is None:
             self.stop_left = of.stop if self.armed else left
             self.armed, self.why = False, "joystick"
@@ -257,7 +257,7 @@ class AxisState(AxisInput):
             fall = of.fall * max(passed, 1) + ROUNDING * of.step
             if abs(self.last) > fall + self.dropped(made):
                 # Only a stop falls so fast: from here on rule 3 demands neutral first.
-                self.halt("fell to neutral at once", made, latch=False)
+                self.halt("fell to neutral at once", made)
         if self.now:
             self.ran = 0.0
         self.last, self.top, self.high, self.way_back = 0.0, of.step, of.step, of.step

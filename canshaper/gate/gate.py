@@ -107,13 +107,13 @@ class Gate:
         """Stop every axis after a standstill; frames until the next tick count as old."""
         self.stood = True
         for axis in self.axes.values():
-            axis.halt("loop stalled", self.made + 1, self.frames, latch=axis.last != 0.0)
+            axis.halt("loop stalled", self.made + 1, self.frames if axis.last else None)
 
     def send_failed(self, key: Key) -> None:
         """Stop the moving axes of a valve frame that did not reach its bus."""
         for axis in self.valves[key].axes if key in self.valves else ():
             if axis.last:
-                axis.halt("send failed", self.made + 1, self.frames, latch=True)
+                axis.halt("send failed", self.made + 1, self.frames)
 
     def withheld(self, key: Key) -> None:
         """Take back the count of a valve frame that was too late and did not leave."""
@@ -200,7 +200,7 @@ class Gate:
     def refused(self, key: Key) -> None:
         """Stop the axes of a refused frame; they wait for a reset."""
         for axis in self.valves[key].axes:
-            axis.halt("refused", self.made, self.frames, latch=True)
+            axis.halt("refused", self.made, self.frames)
 
     def last(self, key: Key, data: bytes) -> str:
         """Return why a valve frame may not be the last one, right and neutral; or empty."""

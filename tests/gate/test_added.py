@@ -130,7 +130,7 @@ class TestAdded:
         assert one.axis.dropped(one.gate.made) == 0.25  # at rest: when it stopped is not known
         slew.last = 0.5
         assert one.axis.dropped(one.gate.made) == 0.0
-        slew.halt("refused", one.gate.made, latch=True)
+        slew.halt("refused", one.gate.made, one.gate.frames)
         assert one.axis.dropped(one.gate.made) == 1.0
         one.axis.of.period = 3
         assert one.axis.dropped(one.gate.made + 6) == 1.0
