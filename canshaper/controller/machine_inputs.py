@@ -129,7 +129,7 @@ class MachineInputs:
 def parts(
     deployment: Deployment,
     senders: Iterable[Sender],
-    inputs: Mapping[tuple[str, int, bool], Part],
+    inputs: Mapping[MessageKey, Part],
     axes: Mapping[str, AxisControl],
     protocols: Iterable[BusProtocol],
 ) -> dict[PartKey, Part]:

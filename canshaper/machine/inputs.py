@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.frame import NULL, at_every_priority, has_destination, with_source
+from canshaper.codec.frame import NULL, MessageKey, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import Chosen, Layout, is_j1939
 from canshaper.codec.message import Protection
 from canshaper.codec.signals import LENGTHS, ends_fault, find_signal, radius_range
@@ -44,7 +44,7 @@ class Bound(Generic[Section_co]):
     chosen: Chosen | None
 
     @property
-    def key(self) -> tuple[str, int, bool]:
+    def key(self) -> MessageKey:
         """(bus, id, extended) of its frames; in J1939 with the source address, 254 for any."""
         can_id, source = self.message.frame_id, self.config.source
         if source is not None:
@@ -52,7 +52,7 @@ class Bound(Generic[Section_co]):
         return self.config.bus, can_id, self.message.is_extended_frame
 
     @property
-    def keys(self) -> list[tuple[str, int, bool]]:
+    def keys(self) -> list[MessageKey]:
         """Every key that its frames may have: in J1939, with a known source, each priority."""
         bus, can_id, extended = self.key
         if not is_j1939(self.message) or self.any_source:

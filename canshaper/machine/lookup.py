@@ -10,6 +10,7 @@ from cantools.database.can import Message
 from canshaper.codec.frame import (
     NULL,
     WITHOUT_PRIORITY,
+    MessageKey,
     group_of,
     has_destination,
     service_of,
@@ -43,7 +44,7 @@ class Lookup:
     diagnostics: Diagnostics
     config: DeploymentConfig
     messages: Messages
-    used: dict[tuple[str, int, bool], UsedMessage] = field(default_factory=dict)
+    used: dict[MessageKey, UsedMessage] = field(default_factory=dict)
     positions: dict[tuple[str, str], tuple[UsedMessage, Any]] = field(default_factory=dict)
 
     @cached_property
@@ -114,7 +115,7 @@ class Lookup:
         """Return a message that we send, with our source address in J1939."""
         return SentMessage(bus, message, self.own_address(bus), protection)
 
-    def fd(self) -> frozenset[tuple[str, int, bool]]:
+    def fd(self) -> frozenset[MessageKey]:
         """Return (bus, id, extended) of the used messages of CAN FD."""
         return frozenset(key for key, used in self.used.items() if is_fd(used.message))
 

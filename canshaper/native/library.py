@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from canshaper.codec.frame import Frame
@@ -34,22 +35,22 @@ ARRAYS = {
     "curve_speed": "cs_real",
     "codes": "cs_code",
 }
-_TABLES = """\
+_TABLES = Template("""\
 /* Numbers of one machine. No line of this is code. */
 #include <math.h>
 
 #include "canshaper.h"
 
 #define R(x) ((cs_real)(x))
-#if WRONG
+#if $wrong
 #error cs_sizes.h is not of this machine
 #endif
 
-const cs_config cs_tables = {};
+const cs_config cs_tables = $config;
 const cs_row cs_rows[] = {
-    ROWS};
-const int32_t cs_rows_n = COUNT;
-"""
+    $rows};
+const int32_t cs_rows_n = $count;
+""")
 
 
 def _sizes(tables: Numbers) -> dict[str, int]:
@@ -77,9 +78,9 @@ def tables_source(tables: Numbers) -> str:
     wrong = " || ".join(f"({name} != {size})" for name, size in _sizes(tables).items())
     plural = {"joystick": "joysticks", "valve": "valves", "axis": "axes", "motion": "motions"}
     counts = {f"{many}_n": len(tables[one]) for one, many in plural.items()}
-    source = _TABLES.replace("WRONG", wrong).replace("{}", _value(tables | counts))
-    rows = [*_rows()]
-    return source.replace("ROWS", ",\n    ".join(rows)).replace("COUNT", str(len(rows)))
+    config, rows = _value(tables | counts), [*_rows()]
+    joined = ",\n    ".join(rows)
+    return _TABLES.substitute(wrong=wrong, config=config, rows=joined, count=len(rows))
 
 
 def _rows() -> Iterator[str]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.message import UNPROTECTED, Sender, SentMessage, SequenceChecker
 from canshaper.codec.signals import find_signal
 from canshaper.errors import ConfigError, Problem
@@ -240,7 +240,7 @@ class PlantNode:
         self._canopen = CanopenSide(deployment)
         self._passed_s = 0.0
         self._inputs = {axis: _ValveInput(axis, deployment) for axis in deployment.axes}
-        self._valves: dict[tuple[str, int, bool], list[_ValveInput]] = {}
+        self._valves: dict[MessageKey, list[_ValveInput]] = {}
         for valve in self._inputs.values():
             key = deployment.axes[valve.axis].valve.message.key
             self._valves.setdefault(key, []).append(valve)

@@ -9,7 +9,7 @@ Bridge and trolley swing the load in their own directions; the hoist excites no 
 import math
 from collections.abc import Callable, Mapping
 
-from canshaper.codec.frame import NULL, Frame, with_source
+from canshaper.codec.frame import NULL, Frame, MessageKey, with_source
 from canshaper.codec.message import FieldSet
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.joysticks import BoundJoystick
@@ -56,11 +56,11 @@ class Recorder:
         self._crane: list[tuple[Point, Point, float]] = []  # tip, grapple, total swing
         self.missed_deadlines = 0
         self.seen: set[str] = set()
-        self._handlers: dict[tuple[str, int, bool], tuple[str, int, _Handler]] = {}
+        self._handlers: dict[MessageKey, tuple[str, int, _Handler]] = {}
         for joystick in deployment.joysticks.values():
             handler = self._joystick(joystick, deployment.axes)
             self._handlers[joystick.key] = joystick.message.name, joystick.message.length, handler
-        valves: dict[tuple[str, int, bool], dict[str, BoundAxis]] = {}
+        valves: dict[MessageKey, dict[str, BoundAxis]] = {}
         for name, axis in deployment.axes.items():
             valves.setdefault(axis.valve.message.key, {})[name] = axis
         for key, axes in valves.items():

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.message import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import BoundSwaySensor
@@ -73,7 +73,7 @@ def sensor_messages(
     deployment: Deployment, parameters: SwaySensorParameters
 ) -> list[SensorMessage]:
     """Return every message with sway that the deployment reads."""
-    messages: dict[tuple[str, int, bool], dict[str, BoundSwaySensor]] = {}
+    messages: dict[MessageKey, dict[str, BoundSwaySensor]] = {}
     for name, axis in deployment.axes.items():
         if bound := axis.sway_sensor:
             messages.setdefault(bound.message.key, {})[name] = bound

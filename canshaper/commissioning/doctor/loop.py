@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.bus.raw import RawPort
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault, MessageKey
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.config.bus import Bus
 from canshaper.controller.controller import Controller
@@ -85,7 +85,7 @@ class Loop:
             name: WatchedPort(name, buses[name], one, faults, self._note, fd=routes[name].fd)
             for name, one in sockets.items()
         }
-        self._valves: dict[tuple[str, int, bool], list[int]] = {}
+        self._valves: dict[MessageKey, list[int]] = {}
         for i, axis in enumerate(deployment.axes.values()):
             self._valves.setdefault(axis.valve.message.key, []).append(i)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
