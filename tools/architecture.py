@@ -21,7 +21,7 @@ WIDTH, ROW, LEFT = 960, 46, 24
 # Rings by what an error can do: who reviews a change, and rooms below canshaper/. A room within
 # another one belongs to the ring that names it.
 RINGS = {
-    # Those beside the gate decide too which frame leaves: past it none would be checked.
+    # The last two decide too which frame leaves: without them none would pass the gate.
     "gate": (
         "someone who did not write it, every line, against safety.md",
         ("gate", "controller/gated", "blackbox/recorder"),

@@ -215,9 +215,9 @@ def section_rows(name: str, links: Mapping[str, str]) -> Iterable[str]:
     return TABLES_OF_PAGES[name]()
 
 
-def column_rows(columns: Mapping[str, str]) -> Iterator[str]:
-    """Table of columns, each with what it is."""
-    yield "| column | what |"
+def column_rows(columns: Mapping[str, str], head: str = "column | what") -> Iterator[str]:
+    """Table of names, each with what it is."""
+    yield f"| {head} |"
     yield "|---|---|"
     for column, text in columns.items():
         yield f"| `{column}` | {text} |"
@@ -230,17 +230,6 @@ def profile_rows() -> Iterator[str]:
     for name, one in PROFILES.items():
         needs = ", ".join(f"`{key}`" for key in one.needs)
         yield f"| `{name}` | {needs} | {one.header} | {one.counter} | {one.crc} |"
-
-
-def log_rows() -> Iterator[str]:
-    """Table of the formats of a log; formats of one kind in one row."""
-    yield "| suffix | written by |"
-    yield "|---|---|"
-    suffixes: dict[str, list[str]] = {}
-    for suffix, one in FORMATS.items():
-        suffixes.setdefault(one.says, []).append(f"`{suffix}`")
-    for says, names in suffixes.items():
-        yield f"| {', '.join(names)} | {says} |"
 
 
 def step_rows() -> Iterator[str]:
@@ -269,7 +258,7 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "rings": ring_rows,
     "trust": trust_rows,
     "shipped": shipped_rows,
-    "logs": log_rows,
+    "logs": lambda: column_rows({s: f.says for s, f in FORMATS.items()}, "suffix | written by"),
 }
 
 

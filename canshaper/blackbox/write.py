@@ -27,7 +27,7 @@ PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpac
 
 
 def last_number(folder: Path, stem: str) -> int:
-    """Return the highest number of a deployment's black boxes in a folder; 0 if none is found."""
+    """Return the highest number of a deployment's black boxes in a folder; 0 without one."""
     try:
         return max(_numbered(folder, stem), default=0)
     except OSError:
@@ -155,7 +155,7 @@ def _text(deployment: Deployment) -> tuple[list[str], str]:
             names.append(str(Path(FOLDER) / source.relative_to(root)))
     if len(relative) < len(sources):  # all at once, the longest first: one path may be in another
         paths = "|".join(map(re.escape, sorted(moved, key=len, reverse=True)))
-        text = re.sub(paths, lambda found: moved[found[0]], text)
+        text = re.sub(paths, lambda match: moved[match[0]], text)
     return names, text
 
 

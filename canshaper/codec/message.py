@@ -169,7 +169,7 @@ class Sender:
         self._count = (self._count - 1) % self._counts if self._counts else 0
 
     def instead(self, frame: Frame) -> Frame:
-        """Return the last frame, which was not sent, anew: same count, present raw values."""
+        """Return the last frame, which was not sent, again: same count, present raw values."""
         self.take_back()
         return self.frame()
 
@@ -212,7 +212,7 @@ class SequenceChecker:
             self.qualified = self._good >= self._qualify
 
     def resync(self) -> None:
-        """After silence, accept any next count but a repeated one, and count good frames anew."""
+        """After silence, accept any next count but a repeated one, and count good frames from 0."""
         self._resynced = True
         self._requalify()
 

@@ -139,7 +139,7 @@ def neutral_fault(protection: Protection, length: int) -> str | None:
 def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, bytes], ...], int]:
     """Return (type, content) of can-gw's attributes, and a mask of bits that must be 0 before.
 
-    ``neutral_fault`` has found nothing. In the mask byte 0 is the lowest.
+    ``neutral_fault`` has no objection. In the mask byte 0 is the lowest.
     """
     check = protection.check
     last = length - 1

@@ -75,9 +75,7 @@ class Daemon:
         self._use(deployment)
 
     def run(self) -> None:
-        """Run until SIGTERM or SIGINT, then send every valve neutral and close the buses.
-
-        A second signal ends the process at once.
+        """Run until a signal, then send neutral and close; a second signal ends at once.
 
         Raises:
             InternalError: a part of the program raised an exception; the end was the same.
@@ -252,11 +250,10 @@ class Daemon:
     # -- ends ----------------------------------------------------------------------------------
 
     def _send_neutral(self, *, wait: bool = False) -> str:
-        """Send every valve neutral; ``wait`` a moment until the frames are on their buses.
+        """Send every valve neutral; ``wait``: return what ``seen_sent`` says after a moment.
 
         Returns:
-            ``not-sent`` if a frame was refused or not sent, or we only listen; else ``sent``, or
-            after a wait what ``seen_sent`` says.
+            ``not-sent`` if a frame was refused or not sent, or we only listen; else ``sent``.
 
         Raises:
             Exception: a neutral frame could not be made; all others were sent first.

@@ -173,9 +173,9 @@ def _axis(bound: "BoundAxis", deployment: "Deployment") -> Axis:
 
 def _in_dbc(deployment: "Deployment", name: str) -> "DbcMessage":
     """Return a message as the DBC has it, without the corrections of the file."""
-    found = deployment.messages.find(name)
-    assert not isinstance(found, str)  # checked with the deployment
-    return found[1]
+    result = deployment.messages.find(name)
+    assert not isinstance(result, str)  # checked with the deployment
+    return result[1]
 
 
 def slack_of(config: "schema.AxisSection") -> float:

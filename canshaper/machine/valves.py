@@ -71,8 +71,7 @@ def bind_valve(
         lookup: shared data of the deployment.
         shared_valves: valve messages bound so far, by bus and name; a new one is added.
         place: place of the section in the deployment file.
-        valve: section ``valve`` of the axis.
-        command: section ``command`` of the axis.
+        valve, command: the sections of the axis.
     """
     before = len(lookup.diagnostics.problems)
     name = _rewritten_joystick(lookup.config, valve)

@@ -1,12 +1,27 @@
 """Our own frames under way on raw sockets: confirmed, late, or never."""
 
+import errno
+
 import pytest
 
 from canshaper.bus import raw
 from canshaper.bus.interface import PROBE_NS
 from canshaper.bus.packet import SIZE
 from canshaper.codec.frame import BusState, FrameFault
-from tests.bus.raw_line import IDS, MARK_AT, OTHER, SENT_BACK, STATUS, TICK_NS, VALVE, Line, message
+from tests.bus.raw_line import (
+    IDS,
+    MARK_AT,
+    OTHER,
+    RECEIVED,
+    SENT_BACK,
+    STATUS,
+    TICK_NS,
+    VALVE,
+    Line,
+    message,
+)
+
+BUS_OFF, RESTARTED = 0x40, 0x100
 
 
 def test_own_frames_are_not_handed_on_but_those_of_another_sender_are(line: Line) -> None:
@@ -203,3 +218,22 @@ def test_nor_does_it_count_how_long_those_were_under_way(
     for _ in range(5):
         line.now_ns += 1_000_000
         assert line.port.send(VALVE)
+
+
+@pytest.mark.parametrize("end", ["bus-off", "down"])
+def test_a_valve_frame_that_the_bus_has_lost_is_never_confirmed(line: Line, end: str) -> None:
+    line.port.send(VALVE)
+    if end == "bus-off":
+        line.error(BUS_OFF)
+    else:
+        line.near[RECEIVED].fail = OSError(errno.ENETDOWN, "down")
+        line.put(message(0x110))
+    line.received()
+    assert line.port.confirmed is False
+    line.error(RESTARTED)  # it is gone, though the bus is back
+    line.received()
+    assert line.port.confirmed is False
+    line.port.send(VALVE)
+    line.confirm(VALVE)
+    line.received()
+    assert line.port.confirmed

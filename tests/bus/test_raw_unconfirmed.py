@@ -78,25 +78,6 @@ def test_valve_frames_are_confirmed_when_each_came_back(line: Line) -> None:
     assert line.port.confirmed
 
 
-@pytest.mark.parametrize("end", ["bus-off", "down"])
-def test_a_valve_frame_that_the_bus_has_lost_is_never_confirmed(line: Line, end: str) -> None:
-    line.port.send(VALVE)
-    if end == "bus-off":
-        line.error(BUS_OFF)
-    else:
-        line.near[RECEIVED].fail = OSError(errno.ENETDOWN, "down")
-        line.put(message(0x110))
-    line.received()
-    assert line.port.confirmed is False
-    line.error(RESTARTED)  # it is gone, though the bus is back
-    line.received()
-    assert line.port.confirmed is False
-    line.port.send(VALVE)
-    line.confirm(VALVE)
-    line.received()
-    assert line.port.confirmed
-
-
 # -- carrier and name ------------------------------------------------------------------------------
 
 

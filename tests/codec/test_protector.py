@@ -25,7 +25,7 @@ def made(protection: Protection) -> Sender:
     [
         (SAME, 4),
         (Protection("C", 16, Checksum("sum", 1)), 4),  # receivers look at the counter alone
-        (Protection("D", 16, Checksum("xor", 1)), 4),  # the file may name the same bits anew
+        (Protection("D", 16, Checksum("xor", 1)), 4),  # the file may rename the same bits
         (Protection("C", 4, Checksum("xor", 1)), 1),
     ],
 )

@@ -174,30 +174,6 @@ def test_what_was_never_seen_released_is_not_pressed() -> None:
     assert one.axis.armed
 
 
-def test_a_release_in_a_frame_that_does_not_count_makes_no_press() -> None:
-    one = bench()
-    seen: list[Frame] = []
-
-    def keep(frame: Frame) -> Frame:
-        seen.append(frame)
-        return frame
-
-    one.change = keep
-    one.ramp(60, near_far=1.0)
-    one.gate.send_failed(one.key)
-    one.rests()
-    (last,) = [f for f in seen if f[:3] == one.deployment.joysticks["left"].key][-1:]
-    field = one.axis.joystick.pressed.of.field
-    released = int.from_bytes(last.data, "little") & ~(field.mask << field.shift)
-    one.gate.receive(last[:3], released.to_bytes(8, "little"), one.now_ns)  # its counter stands
-    assert one.axis.joystick.pressed.released
-    one.rests()
-    assert not one.axis.armed
-    one.rests(enable=False)
-    one.rests(1)
-    assert one.axis.armed
-
-
 @pytest.mark.parametrize(("age_ns", "armed"), [(100 * MS, True), (100 * MS + 1, False)])
 def test_it_counts_until_its_timeout(age_ns: int, armed: bool) -> None:
     one = bench()

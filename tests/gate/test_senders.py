@@ -26,7 +26,7 @@ SENDERS = {
     "commissioning/doctor/loop.py": (1, "a port of sockets in place of a bus"),
     "studio/crane.py": (1, "joysticks, where the page drives a simulated machine"),
     "bus/netlink.py": (1, "asks the kernel"),
-    "daemon/notify.py": (6, "tells systemd"),
+    "daemon/notify.py": (6, "notifies systemd"),
     "daemon/control_server.py": (1, "answers on the control socket"),
     "commissioning/control_client.py": (1, "asks on the control socket"),
     "commissioning/doctor/joysticks.py": (2, "a pair of sockets"),
@@ -60,7 +60,7 @@ def sends(text: str) -> int:
 
 
 def processors(text: str) -> set[str]:
-    """What a text runs cycles with."""
+    """Processors that the cycles of a module run with, as they stand in its text."""
     calls = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call))
     named = ((call, CYCLES.get(ast.unparse(call.func))) for call in calls)
     return {ast.unparse(call.args[number]) for call, number in named if number is not None}

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from canshaper.codec.frame import Frame
 from canshaper.gate.axis import FOREIGN_NS
 from tests.faults import variants
 from tests.gate.bench import Bench, bench, load, signs
@@ -20,6 +21,14 @@ class TestStopsAtOnce:
         one = bench(**limits)
         one.ramp(60, near_far=1.0)
         return one
+
+    def needs_another_press(self, one: Bench) -> None:
+        """Reset that is held resets nothing; released and pressed again it does."""
+        one.rests(5, reset=True)
+        assert not one.axis.armed
+        one.rests(1)
+        one.rests(2, reset=True)
+        assert one.axis.armed
 
     def test_a_second_sender(self) -> None:
         one = self.moving()
@@ -98,22 +107,14 @@ class TestStopsAtOnce:
         one = self.moving()
         assert not one.sends(60, near_far=1.0, reset=True)
         one.gate.send_failed(one.key) if failed else one.gate.stalled()
-        one.rests(5, reset=True)
-        assert not one.axis.armed
-        one.rests(1)
-        one.rests(2, reset=True)
-        assert one.axis.armed
+        self.needs_another_press(one)
 
     def test_a_press_in_the_same_tick_just_before_it_is_no_reset(self) -> None:
         one = self.moving()
         one.receive(one.joysticks(reset=True, near_far=1.0))
         one.gate.disagrees([one.axis])
         assert "why=decoders" in one.sent(60)
-        one.rests(5, reset=True)
-        assert not one.axis.armed
-        one.rests(1)
-        one.rests(2, reset=True)
-        assert one.axis.armed
+        self.needs_another_press(one)
 
     def test_a_press_while_the_reason_lasts_is_no_reset(self) -> None:
         """At rest a lost emergency stop would latch nothing: it keeps what it latched in motion."""
@@ -146,6 +147,29 @@ class TestStopsAtOnce:
         one.sent(0)
         one.gate.disagrees([one.axis])
         one.sends(0, near_far=1.0)
+        one.rests(1)
+        assert one.axis.armed
+
+    def test_a_release_in_a_frame_that_does_not_count_makes_no_press(self) -> None:
+        one = bench()
+        seen: list[Frame] = []
+
+        def keep(frame: Frame) -> Frame:
+            seen.append(frame)
+            return frame
+
+        one.change = keep
+        one.ramp(60, near_far=1.0)
+        one.gate.send_failed(one.key)
+        one.rests()
+        (last,) = [f for f in seen if f[:3] == one.deployment.joysticks["left"].key][-1:]
+        field = one.axis.joystick.pressed.of.field
+        released = int.from_bytes(last.data, "little") & ~(field.mask << field.shift)
+        one.gate.receive(last[:3], released.to_bytes(8, "little"), one.now_ns)  # its counter stands
+        assert one.axis.joystick.pressed.released
+        one.rests()
+        assert not one.axis.armed
+        one.rests(enable=False)
         one.rests(1)
         assert one.axis.armed
 

@@ -71,7 +71,7 @@ REST, UP = Held(enable=True), Held({"lift": 1.0}, enable=True)
 
 
 def driven(machine: Machine, **how: int) -> Machine:
-    """The same machine, with the lift at full speed."""
+    """The machine with its lift at full speed."""
     sent = [machine.tick(REST, **how) for _ in range(10)]
     sent += [machine.tick(UP, **how) for _ in range(90)]
     assert (sent[9], sent[-1], machine.why) == (0, FULL, ACTIVE)

@@ -63,31 +63,21 @@ def test_an_absolute_path_is_made_a_relative_one(machine: Path, tmp_path: Path) 
     assert load_deployment(file).axes
 
 
-def test_files_of_one_name_in_two_folders_stay_two(machine: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("relative", [False, True])
+def test_files_of_one_name_in_two_folders_stay_two(
+    machine: Path, tmp_path: Path, *, relative: bool
+) -> None:
     """One path is also the end of the other, and both files have the same name."""
     first = tmp_path / "d" / "forwarder.dbc"
-    second = Path(f"{tmp_path / 'e'}{first}")
-    for path in (first, second):
+    second = f"e{first}" if relative else f"{tmp_path / 'e'}{first}"
+    for path in (first, machine.parent / second):
         path.parent.mkdir(parents=True)
     shutil.move(tmp_path / "here" / "dbc" / "forwarder.dbc", first)
-    second.write_text('VERSION ""\nBU_: A\nBO_ 1000 Other: 8 A\n SG_ S : 0|8@1+ (1,0) [0|1] "" A\n')
+    other = 'VERSION ""\nBU_: A\nBO_ 1000 Other: 8 A\n SG_ S : 0|8@1+ (1,0) [0|1] "" A\n'
+    (machine.parent / second).write_text(other)
     text = machine.read_text()
     assert "dbc: [../dbc/forwarder.dbc]" in text
     machine.write_text(text.replace("../dbc/forwarder.dbc", f"{first}, {second}"))
-    before = load_deployment(machine).identity.content
-    _, file = unpack(packed(machine, tmp_path), tmp_path / "there")
-    assert load_deployment(file).identity.content == before
-
-
-def test_a_relative_path_that_holds_an_absolute_one_stays(machine: Path, tmp_path: Path) -> None:
-    first = tmp_path / "d" / "forwarder.dbc"
-    second = Path(f"{machine.parent / 'e'}{first}")
-    for path in (first, second):
-        path.parent.mkdir(parents=True)
-    shutil.move(tmp_path / "here" / "dbc" / "forwarder.dbc", first)
-    second.write_text('VERSION ""\nBU_: A\nBO_ 1000 Other: 8 A\n SG_ S : 0|8@1+ (1,0) [0|1] "" A\n')
-    text = machine.read_text()
-    machine.write_text(text.replace("../dbc/forwarder.dbc", f"e{first}, {first}"))
     before = load_deployment(machine).identity.content
     _, file = unpack(packed(machine, tmp_path), tmp_path / "there")
     assert load_deployment(file).identity.content == before

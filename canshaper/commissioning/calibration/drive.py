@@ -121,7 +121,7 @@ class CalibrationDrive:
 
     @property
     def waiting_for(self) -> str:
-        """What the ramp waits for before it begins, a reason or words; empty afterwards."""
+        """Reason for which the ramp has not begun, or words; empty once it has."""
         if self._begun_ns is not None:
             return ""
         for control, joystick, _ in self._driven.values():

@@ -55,7 +55,7 @@ class AxisTraffic:
 
 @dataclass
 class Traffic:
-    """What a log shows.
+    """Messages, axes and moving signals in a log.
 
     Attributes:
         duration_s: from the first frame to the last one.

@@ -197,7 +197,7 @@ def time_optimal_s(
     """Return the least time in s of a speed change by 1 without residual, output in [low, high].
 
     The output is a limit for shapers, not a shaper for moving joysticks: it may go back. Three
-    swings where no shorter time is found.
+    swings where no shorter time does.
     """
     n_low, n_high = 1, round(3.0 * mode.period_s / tick_s)
 

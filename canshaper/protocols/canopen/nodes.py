@@ -101,7 +101,7 @@ class RemoteNode:
         self.state = None
 
     def copy_state(self, before: Self) -> None:
-        """Copy state, emergency and times of the same node; ``stops`` and ``alarms`` count anew."""
+        """Copy state, emergency and times of the same node; ``stops`` and ``alarms`` begin at 0."""
         self.state, self.emergency = before.state, before.emergency
         self._last_frame_ns, self._start_ns = before._last_frame_ns, before._start_ns
 

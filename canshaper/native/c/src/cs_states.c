@@ -52,10 +52,10 @@ void cs_states_step(cs_axis *a, const cs_axis_config *c, const cs_input *in, boo
         a->stopping = cs_later(a->stopping, 1);
         if (a->stopping >= c->stop_ticks) { holding |= STOP_OVER; }
     }
-    const cs_row *found = NULL;
-    for (int32_t i = 0; (i < cs_rows_n) && (found == NULL); i++) {
+    const cs_row *taken = NULL;
+    for (int32_t i = 0; (i < cs_rows_n) && (taken == NULL); i++) {
         const cs_row *r = &cs_rows[i];
-        if ((r->state == a->state) && ((r->when & holding) == r->when)) { found = r; }
+        if ((r->state == a->state) && ((r->when & holding) == r->when)) { taken = r; }
     }
-    if (found != NULL) { take(a, found, (in->trip == CS_NONE) ? in->fault : in->trip); }
+    if (taken != NULL) { take(a, taken, (in->trip == CS_NONE) ? in->fault : in->trip); }
 }
