@@ -226,14 +226,14 @@ def j1939_code(signal: Signal) -> int | None:
     return 0xFE << signal.length - 8 if whole else (1 << signal.length) - 2
 
 
-def j1939_fault(signal: Signal) -> str | None:
-    """Return why an error code of J1939-71 would be read as a measurement, or None.
+def j1939_fault(signal: Signal, *, command: bool = False) -> str | None:
+    """Return why an error code of J1939-71 would be a measurement, or a ``command``; or None.
 
-    It is none where the code lies out of the range, or where the DBC names it.
+    It is none out of the range; nor is it a measurement where the DBC names it.
     """
     if (first := j1939_code(signal)) is None:
         return None
-    names: Mapping[int, object] = signal.choices or {}
+    names: Mapping[int, object] = {} if command else signal.choices or {}
     last, few = raw_limits(signal)[1], len(names)
     # A range has one end beyond these codes, and each name takes one of them.
     ends = (*range(first, min(first + few, last) + 1), *range(last, max(last - few, first) - 1, -1))
@@ -244,9 +244,10 @@ def j1939_fault(signal: Signal) -> str | None:
     low, high = signal.minimum, signal.maximum
     got = "no range" if low is None or high is None or high <= low else f"[{low:g}|{high:g}]"
     value = f"{raw * signal.scale + signal.offset:g} {signal.unit or ''}".rstrip()
+    cure = "" if command else ", or names for them (VAL_)"
     return (
         f"{signal.name}: expected a range that ends before the error codes of J1939, {first} to"
-        f" {last}, or names for them (VAL_), got {got}: {raw} would be {value}"
+        f" {last}{cure}, got {got}: {raw} would be {value}"
     )
 
 

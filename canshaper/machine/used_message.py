@@ -226,10 +226,10 @@ class UsedMessage:
                 text += f" every frame of {self.message.name} carries it; got {raw:g}, {value:g}"
                 self.add_fault(f"{signal.name}: GenSigStartValue: {text} {unit}".rstrip())
 
-    def check_errors(self, signal: Signal) -> None:
-        """Check that no error code of J1939 is a measurement, or a command."""
+    def check_errors(self, signal: Signal, *, command: bool = False) -> None:
+        """Check that no error code of J1939 is a measurement, or, named too, a ``command``."""
         if is_j1939(self.message):
-            self.add_fault(j1939_fault(signal))
+            self.add_fault(j1939_fault(signal, command=command))
 
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
         """Check that a signal is an integer, and unsigned unless ``signed``."""

@@ -228,7 +228,7 @@ def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -
         used.add_fault(fault)
         return None
     used.check_integer(place, signal)
-    used.check_errors(signal)
+    used.check_errors(signal, command=True)
     used.use(place, signal, key_path(place))
     return None if signal.is_float else signal
 

@@ -105,10 +105,12 @@ ERRORS = "expected a range that ends before the error codes of J1939,"
             },
         ),
         (
-            [("PortFlow : 0|8@1+ (0.4,0) [0|100]", "PortFlow : 0|8@1+ (0.4,0) [0|102]")],
+            [
+                ("PortFlow : 0|8@1+ (0.4,0) [0|100]", "PortFlow : 0|8@1+ (0.4,0) [0|102]"),
+                (UNNAMED[0], f'{UNNAMED[0]}\nVAL_ 2365468926 PortFlow 254 "Error" 255 "None" ;'),
+            ],
             {
-                f"AVC{n}: PortFlow: {ERRORS} 254 to 255, or names for them (VAL_), got [0|102]:"
-                " 254 would be 101.6 %"
+                f"AVC{n}: PortFlow: {ERRORS} 254 to 255, got [0|102]: 254 would be 101.6 %"
                 for n in range(3)
             },
         ),
