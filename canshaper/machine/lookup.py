@@ -91,6 +91,9 @@ class Lookup:
             self.diagnostics, place, file, message, can_id, any_source, chosen(in_dbc, config)
         )
         self._check_j1939(used, bus, received=received, source=source)
+        for state in (s.name for s in in_dbc.signals if j1939 and s.name in bits and s.length == 2):
+            text = f"{state}: expected the signal, as its two bits are one state in J1939 (2 is an"
+            used.add("message", f"{text} error, 3 not available), got {state}/0 or {state}/1")
         self._check_pdo(used, bus)
         key = (bus, can_id & WITHOUT_PRIORITY if j1939 else can_id, message.is_extended_frame)
         if key in self.used:

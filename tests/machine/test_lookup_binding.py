@@ -52,6 +52,12 @@ def test_outside_of_j1939_every_bit_of_an_id_counts(machine: Machine) -> None:
         ),
         (
             J1939,
+            [("of 20 ms\n    enable: Button1", "of 20 ms\n    enable: Button1/0")],
+            "joysticks.left.message: Button1: expected the signal, as its two bits are one state in"
+            " J1939 (2 is an error, 3 not available), got Button1/0 or Button1/1",
+        ),
+        (
+            J1939,
             [("BO_ 2365445886 BJM1: 8", "BO_ 2365445886 BJM1: 9")],
             "joysticks.left.message: BJM1: expected 8 bytes at most, got 9",
         ),
