@@ -1,5 +1,7 @@
 """A daemon whose ticks the test makes."""
 
+import logging
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -23,3 +25,14 @@ def box(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     drive(bench, folder, TRIP + 8 * SECOND)
     (path,) = folder.iterdir()
     return path
+
+
+@pytest.fixture
+def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
+    caplog.set_level(logging.INFO, "canshaper")
+    return lambda: [r.getMessage() for r in caplog.records if "black-box" in r.getMessage()]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "boxes"

@@ -43,3 +43,8 @@ def inside(box: Path, folder: Path) -> Path:
     path = folder / write.BOX
     path.write_bytes(zipfile.ZipFile(box).read(write.BOX))
     return path
+
+
+def verified(folder: Path, name: str = "machine-0001.zip") -> str:
+    """Verify a box of the folder by replay; return what the command prints."""
+    return replayed(folder / name, "--verify", "--out", folder.parent / "out")
