@@ -24,7 +24,9 @@ def cranes(deployment: Deployment) -> list[str]:
 
 
 def one_crane(deployment: Deployment, crane: str) -> Deployment:
-    """Return the deployment with one crane's axes under their own names, its joysticks and buses.
+    """Return the deployment of one crane: ``front_slew`` of the crane ``front`` becomes ``slew``.
+
+    Joysticks, switches and buses stay if its axes need them, the emergency stop if its bus stays.
 
     Raises:
         DesignError: the deployment has no such crane.

@@ -49,7 +49,7 @@ class SensorMessage:
         }
 
     def frames(self, state: CraneState, passed_s: float) -> Iterator[Frame]:
-        """Yield the frame if it is due once passed_s more seconds have passed."""
+        """Take the state passed_s after the last; yield the frame if due, none from lost_s on."""
         time_s = state.time_s
         sway = Sway(
             state.theta5_rad, state.theta6_rad, state.theta5_rate_rad_s, state.theta6_rate_rad_s
@@ -72,7 +72,7 @@ class SensorMessage:
 def sensor_messages(
     deployment: Deployment, parameters: SwaySensorParameters
 ) -> list[SensorMessage]:
-    """Return every message with sway that the deployment reads."""
+    """Return every message with sway that the deployment reads, each with all its sensors."""
     messages: dict[MessageKey, dict[str, BoundSwaySensor]] = {}
     for name, axis in deployment.axes.items():
         if bound := axis.sway_sensor:
