@@ -1,13 +1,13 @@
 """Frames of the sway sensors that a deployment reads."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.message import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import BoundSwaySensor
-from canshaper_sim.axes import SLEW
+from canshaper_sim.axes import BRIDGE, SLEW
 from canshaper_sim.crane import CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.sway_sensor import SwaySensor, SwaySensorParameters
@@ -18,6 +18,7 @@ class SensorMessage:
 
     Args:
         axes: axis -> the sway sensor of the deployment that is read from this message.
+        across: axes whose load swings by theta5: those that slew, or move the bridge.
         parameters: errors of the sensors.
 
     Attributes:
@@ -25,7 +26,10 @@ class SensorMessage:
     """
 
     def __init__(
-        self, axes: Mapping[str, BoundSwaySensor], parameters: SwaySensorParameters
+        self,
+        axes: Mapping[str, BoundSwaySensor],
+        across: Collection[str],
+        parameters: SwaySensorParameters,
     ) -> None:
         first = next(iter(axes.values()))
         message, self.node = first.message, first.config.node
@@ -41,7 +45,7 @@ class SensorMessage:
                 SwaySensor(
                     parameters,
                     name,
-                    across=name == SLEW,
+                    across=name in across,
                     kind=bound.config.kind,
                 ),
             )
@@ -77,4 +81,6 @@ def sensor_messages(
     for name, axis in deployment.axes.items():
         if bound := axis.sway_sensor:
             messages.setdefault(bound.message.key, {})[name] = bound
-    return [SensorMessage(axes, parameters) for axes in messages.values()]
+    moves = deployment.coordinates
+    across = {name for name in deployment.axes if moves.get(name, name) in (SLEW, BRIDGE)}
+    return [SensorMessage(axes, across, parameters) for axes in messages.values()]

@@ -60,7 +60,7 @@ class SwaySensor:
     Args:
         parameters: errors of the sensor.
         name: name of the sensor, which seeds its noise.
-        across: the sensor measures across the boom (theta5), else along it (theta6).
+        across: the sensor measures across the boom or along the runway (theta5), else theta6.
         kind: the measured quantity: angle, rate, or inclination against the vertical.
     """
 
