@@ -118,7 +118,7 @@ class CanopenSide:
                 valve.receive(frame.data)
         if frame.can_id == NMT and not frame.extended and frame.data[:1] == bytes((START,)):
             for (bus, _), node in self._nodes.items():
-                if bus == frame.bus and frame.data[1] in (0, node.number):
+                if bus == frame.bus and frame.data[1:2] in (b"\0", bytes((node.number,))):
                     node.state = NodeState.OPERATIONAL
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
