@@ -193,7 +193,7 @@ def _default(value: Any) -> str:
 
 
 def section_names(kind: type[Section] = Section) -> dict[str, type[Section]]:
-    """Return name -> class of a section and all below it; of all sections by default."""
+    """Return name -> class of a section and its subclasses; of all sections by default."""
     below = [section_names(one) for one in kind.__subclasses__()]
     return {kind.__name__: kind} | {name: one for names in below for name, one in names.items()}
 

@@ -98,7 +98,7 @@ class Verdict:
 
 
 def _run(name: str, items: list[pytest.Item], killer: Path) -> None:
-    """Run the tests with a mutant, then end the process; time limits end it by a signal."""
+    """Run the tests with a mutant; end the process: 0, FAILED, or a signal of a time limit."""
     try:
         set_mutant_under_test(name)
         items[0].config.pluginmanager.register(Verdict(killer))

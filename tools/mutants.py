@@ -97,7 +97,7 @@ MORE = (
 
 
 def run(processes: int, patterns: list[str], known: Collection[str] | None = None) -> int:
-    """Make the mutants and run the tests of each.
+    """Make the mutants in ./mutants, which must not exist, and run the tests of each.
 
     Args:
         processes: how many at a time.

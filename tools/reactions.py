@@ -19,7 +19,7 @@ class Row(NamedTuple):
         ids: names of reasons or faults, with commas between, or a number such as R1.
         what: the fault, where its name does not say it, and what else happens.
         tests: ROOM/FILE or ROOM/FILE::WORDS of a test's name, with blanks between.
-        within: longest time until the reaction, such as "T + tick"; T: the timeout_ms of a joystick.
+        within: longest time until the reaction, such as "T + tick"; T: timeout of a joystick.
         reaction: where no reason decides it.
     """
 

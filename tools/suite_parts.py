@@ -28,7 +28,7 @@ Command = list[str]
 
 
 def pytest(*arguments: str) -> Command:
-    """Return the command of pytest on these paths, or on all tests without kernel and browser."""
+    """Return the command of pytest; without a path, on all tests but kernel and browser."""
     paths = [] if any(word.startswith("tests/") for word in arguments) else ["tests", "studies"]
     ignored = ["--ignore=tests/hil", "--ignore=tests/systemd"]
     ignored = [*ignored, "--ignore-glob=*/test_browser*.py"] if paths else []

@@ -137,7 +137,7 @@ class Actuator:
     def _most_speeds(
         self, cushion: EndParameters, towards: float, step_s: float
     ) -> tuple[float, float]:
-        """Return the largest speeds at middle and end of a step in the direction of `towards`."""
+        """Return the cushion's largest speeds at middle and end of a step, by `towards`' sign."""
         full_speed = self._full_speed
         room = self._high - self.position if towards > 0.0 else self.position - self._low
         # sqrt(room) falls in a straight line, and so does the speed.

@@ -49,7 +49,7 @@ class Bend:
     def advance(
         self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion]
     ) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Let step_s seconds pass; return start, middle and end of the tip for a stiff boom's."""
+        """Let step_s seconds pass; add the bend to the stiff boom's motion (start, middle, end)."""
         slew = self._points(self.slew, [tip.slew_acceleration_rad_s2 for tip in tips], step_s)
         radius = self._points(self.radius, [tip.radius_acceleration_m_s2 for tip in tips], step_s)
         height = self._points(self.height, [tip.height_acceleration_m_s2 for tip in tips], step_s)

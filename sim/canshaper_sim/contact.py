@@ -47,7 +47,7 @@ class ContactParameters:
     def accelerations(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """Return what contact adds to (theta5'', theta6''), rad/s^2; zeros above the ground."""
+        """Return what contact adds to (theta5'', theta6''), rad/s^2; zeros if there is none."""
         theta5, theta6, rate5, rate6 = sway
         s5, c5, s6, c6 = math.sin(theta5), math.cos(theta5), math.sin(theta6), math.cos(theta6)
         below = grapple.l2_m + self.reach_m

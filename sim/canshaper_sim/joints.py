@@ -240,7 +240,7 @@ def _dot(row: Iterable[float], column: Iterable[float]) -> float:
 def _stages(
     step_s: float, way: float, speed: float, end_speed: float, end_acceleration: float
 ) -> tuple[float, float]:
-    """Return the accelerations at start and middle of a step that goes this way to end_speed."""
+    """Return start and middle acceleration of a step that covers `way` and ends at `end_speed`."""
     travel = 6.0 * (way / step_s - speed) / step_s
     change = 6.0 * (end_speed - speed) / step_s
     middle = 0.5 * (change - end_acceleration - travel)

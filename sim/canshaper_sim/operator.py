@@ -85,7 +85,7 @@ _PAUSE_SHARE = 0.33
 
 
 def reach_s(axes: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return axis -> (lowest, highest) sum of random strokes, s of full speed, for such a crane."""
+    """Return axis -> (lowest, highest) sum of random strokes, s of full speed, with such axes."""
     return REACH_S | _REACH_OF.get(kind_of(axes), {})
 
 

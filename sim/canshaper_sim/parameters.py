@@ -14,7 +14,7 @@ P = TypeVar("P")
 
 
 def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float]:
-    """Return dotted name (``grapple.l2_m``) -> value of all; by default of the nominal crane."""
+    """Return dotted name (grapple.l2_m) -> value of every parameter, by default the nominal."""
     values: dict[str, float] = {}
     owner = CraneParameters() if parameters is None else parameters
     for field in dataclasses.fields(owner):

@@ -50,7 +50,7 @@ def open_ports(deployment: Deployment) -> dict[str, Port]:
 def run_plant(
     deployment: Deployment, parameters: CraneParameters, machine: str | None = None
 ) -> None:
-    """Simulate the crane until SIGTERM or SIGINT: read valves every 10 ms, send every 20 ms."""
+    """Simulate the crane until SIGTERM or SIGINT: valve frames in, feedback out every 20 ms."""
     node = PlantNode(deployment, parameters, machine)
     ports = open_ports(deployment)
     stop = StopFlag()

@@ -32,14 +32,14 @@ _PLAY = 1e-6
 
 
 class Bounds(NamedTuple):
-    """Lowest (<= 0) and highest (>= 0) rate of every joint, fractions of full speed."""
+    """Lowest (<= 0) and highest (>= 0) rate of lift, knuckle, extension; part of full speed."""
 
     low: Vector
     high: Vector
 
 
 class ResolvedRates:
-    """Joint rates in one pose; ``free`` is the motion n that leaves the tip, or zeros if none."""
+    """Joint rates in one pose; ``free`` is n, the motion that keeps the tip still, or zeros."""
 
     __slots__ = ("_height", "_inverse", "_radius", "free")
 
@@ -118,7 +118,7 @@ class ResolvedRates:
     ) -> tuple[list[tuple[float, float]], list[tuple[float, float]], float]:
         """Return lower bounds of t, upper bounds of t, and an upper bound of s.
 
-        A bound of t is (at, by) for at - s by. Joints that n does not move bound s, 1 does too.
+        A bound of t is (at, by) for at - s by. Joints that n does not move bound s, and so does 1.
         """
         floors: list[tuple[float, float]] = []
         ceilings: list[tuple[float, float]] = []

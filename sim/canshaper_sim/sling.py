@@ -86,7 +86,7 @@ class SlungLoad:
         return plus((0.0, 0.0, 0.0), -part_s * self._p.load_ratio, held)
 
     def _held(self, up: Vector, hook_rate: Vector) -> Vector:
-        """Return the sling's pull at the load, m/s^2; `up` is from there to the hook, m."""
+        """Return the sling's pull at the load, m/s^2, zeros if slack; `up` leads to the hook, m."""
         apart = math.sqrt(dot(up, up))
         stretch = apart - self._p.length_m
         if stretch <= 0.0:

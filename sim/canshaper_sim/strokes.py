@@ -120,7 +120,7 @@ class Script:
         return self._by_axis.get(axis, ())
 
     def command(self, axis: str, time_s: float) -> float:
-        """Return the sum of the axis' strokes, at most -1 .. 1; 0 for an axis without strokes."""
+        """Return the sum of the axis' strokes, cut to -1 .. 1; 0 for an axis without strokes."""
         strokes = self._by_axis.get(axis)
         if strokes is None:
             return 0.0

@@ -96,14 +96,14 @@ class SwaySensor:
             past.popleft()
 
     def _fused(self, angle: float, passed_s: float) -> float:
-        """Return the angle in rad of a gyro that accelerations pull to 0, as on a free pendulum."""
+        """Return a gyro's angle, rad, drawn to the 0 that accelerations show on a free pendulum."""
         fusion_s = self._parameters.fusion_s
         share = -math.expm1(-passed_s / fusion_s) if fusion_s else 1.0
         self._hidden += share * (angle - self._hidden)
         return angle - self._hidden
 
     def value(self, time_s: float) -> float:
-        """Return the next measurement with its errors, degrees or degrees per second."""
+        """Return the next measurement with its errors and faults, degrees or degrees per second."""
         p = self._parameters
         gain = -p.gain if time_s >= p.reversed_s else p.gain
         value = gain * self._past[0][1] + p.offset_deg + self._noise.gauss(0.0, p.noise_deg)

@@ -80,7 +80,7 @@ class ValveParameters:
 
 
 class Valve:
-    """A valve in motion: call `set_command`, then `advance` in steps, read `speed`.
+    """A valve in motion: call `set_command`, `advance` in steps, read `speed`, part of full speed.
 
     `supply` is the part of its demanded oil that the valve gets in the next step, 1 unless
     pump or load set it.
