@@ -60,7 +60,7 @@ STYLE = """
 
 
 def purpose(room: str) -> str:
-    """First sentence of a room's docstring."""
+    """Return the first paragraph of a room's docstring in one line; empty without one."""
     place = ROOT / "canshaper" / room
     file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
     doc = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
@@ -68,17 +68,17 @@ def purpose(room: str) -> str:
 
 
 def layers() -> list[list[str]]:
-    """Rooms side by side, top to bottom, as the contract has them."""
+    """Return the rows of the import contract, top to bottom; rooms of a row stand side by side."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
     rows = contracts["contracts"][0]["layers"]
     return [[name.strip().removeprefix("canshaper.") for name in row.split("|")] for row in rows]
 
 
 def ring_rows() -> Iterator[str]:
-    """Table of the rings, with their lines of Python and C to the nearest thousand.
+    """Yield the Markdown table of the rings; lines of Python and C in thousands, 1 at least.
 
     Raises:
-        ValueError: a module of the package is in no ring.
+        ValueError: a module, other than ``__init__`` and ``__main__``, is in no ring.
     """
     package = ROOT / "canshaper"
     lines = dict.fromkeys(RINGS, 0)
@@ -99,7 +99,7 @@ def ring_rows() -> Iterator[str]:
 
 
 def box(room: str, left: float, top: float, width: float) -> list[str]:
-    """One room; a number where the frame passes."""
+    """Return a room as lines of SVG (px): name, purpose, its number on the way of a frame."""
     kind = "desk" if room in DESK else "daemon"
     on_path = " path" if room in PATH else ""
     text = purpose(room)
@@ -119,7 +119,7 @@ def box(room: str, left: float, top: float, width: float) -> list[str]:
 
 
 def drawing() -> str:
-    """The picture."""
+    """Return the text of the SVG file."""
     body: list[str] = []
     top = 44.0
     for row in layers():

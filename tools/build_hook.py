@@ -1,6 +1,6 @@
-"""Builds site and manual pages before a wheel or a source distribution, which both have them.
+"""Puts the site and the manual pages of out/ into a wheel or a source distribution.
 
-An installation from a checkout in which neither was built goes without them.
+Without a site (``make docs`` builds it), and in an editable installation, both are left out.
 """
 
 from pathlib import Path
@@ -10,10 +10,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class CustomBuildHook(BuildHookInterface):
-    """Puts them in; a source distribution keeps them where its wheel looks for them."""
+    """Adds site and manual pages; a source distribution keeps them in out/, for its wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Before a target is built."""
+        """Add the files to ``build_data``; version is "standard" or "editable"."""
         out = Path(self.root) / "out"
         if version == "editable" or not (out / "site" / "index.html").exists():
             return

@@ -64,7 +64,7 @@ TESTS: Mapping[str, str] = {
 
 
 def claim_rows() -> Iterator[str]:
-    """Table of the tests of the claims that are no reactions."""
+    """Yield the Markdown table of the tests of the claims that are no reactions."""
     yield "| claim | tests |"
     yield "|---|---|"
     for claim, tests in TESTS.items():

@@ -45,12 +45,12 @@ TABLES: Mapping[str, type[IntEnum]] = {
 
 
 def with_value_tables(dbc: str, tables: Mapping[str, type[IntEnum]]) -> str:
-    """Text of a DBC file with the members of enumerations in its value tables.
+    """Return the text of a DBC file with the members of enumerations in its value tables.
 
     Args:
         dbc: the text.
-        tables: enumerations by the signals that carry them; a signal of that name whose table
-            begins with another word is one of another message.
+        tables: enumerations by the signals that carry them. A table that begins with another number
+            or word belongs to another message and stays.
     """
     for signal, kind in tables.items():
         (first, *_), rows = kind, " ".join(f'{int(m)} "{m.name}"' for m in kind)
@@ -60,7 +60,7 @@ def with_value_tables(dbc: str, tables: Mapping[str, type[IntEnum]]) -> str:
 
 
 def state_rows() -> Iterator[str]:
-    """Table of the states."""
+    """Yield the Markdown table of the states."""
     yield "| no. | state | valve | meaning |"
     yield "|---|---|---|---|"
     for state, text in STATE_TEXTS.items():
@@ -68,7 +68,7 @@ def state_rows() -> Iterator[str]:
 
 
 def status_rows() -> Iterator[str]:
-    """Table of the signals of a status message."""
+    """Yield the Markdown table of an axis' signals in a status message."""
     yield "| signal | value | sent |"
     yield "|---|---|---|"
     for one in AXIS_STATUS:
@@ -77,7 +77,7 @@ def status_rows() -> Iterator[str]:
 
 
 def diagram() -> Iterator[str]:
-    """The transitions as a diagram."""
+    """Yield the transitions of the states as a Mermaid diagram."""
     yield "```mermaid"
     yield "stateDiagram-v2"
     yield "    [*] --> NEUTRAL_WAIT"
@@ -87,7 +87,7 @@ def diagram() -> Iterator[str]:
 
 
 def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iterator[str]:
-    """Table of the reasons."""
+    """Yield the Markdown table of the reasons; one without a text ends the program."""
     yield "| no. | reason | meaning | what helps | FMI |"
     yield "|---|---|---|---|---|"
     for reason in reasons:
@@ -99,7 +99,7 @@ def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iter
 
 
 def fault_rows() -> Iterator[str]:
-    """Table of the faults."""
+    """Yield the Markdown table of the faults of frames and buses."""
     yield "| no. | fault | counted in | meaning |"
     yield "|---|---|---|---|"
     for fault, text in FAULT_TEXTS.items():
@@ -107,7 +107,7 @@ def fault_rows() -> Iterator[str]:
 
 
 def trust_rows() -> Iterator[str]:
-    """Table of the states of trust in a sway sensor."""
+    """Yield the Markdown table of the states of trust in a sway sensor."""
     yield "| no. | state | why | back |"
     yield "|---|---|---|---|"
     for trust, (why, back) in TRUST_TEXTS.items():
@@ -115,7 +115,7 @@ def trust_rows() -> Iterator[str]:
 
 
 def shipped_rows() -> Iterator[str]:
-    """Table of the shipped deployments, each with the first sentence of its file."""
+    """Yield the Markdown table of config/, each file with the first sentence of its comment."""
     yield "| deployment | what |"
     yield "|---|---|"
     for path in sorted((ROOT / "config").glob("*.yaml")):
@@ -126,7 +126,10 @@ def shipped_rows() -> Iterator[str]:
 
 
 def _names(reasons: frozenset[Reason]) -> str:
-    """Reasons by name; most of a kind as that kind, with those that are missing."""
+    """Return names of reasons in a line.
+
+    Where they are more than half of a reaction's reasons, its name and the missing ones stand.
+    """
     words = []
     for reaction in (Reaction.SHAPED_STOP, Reaction.NEUTRAL):
         kind = {reason for reason, one in REACTION_OF.items() if one is reaction}
@@ -138,10 +141,10 @@ def _names(reasons: frozenset[Reason]) -> str:
 
 
 def key_rows(section: type[Section], links: Mapping[str, str]) -> Iterator[str]:
-    """List of the keys that a section has by itself: default, range, unit, what each is.
+    """Yield the Markdown list of a section's own keys: default, range, unit, what each is.
 
     Args:
-        section: of the schema.
+        section: of the schema; inherited keys are left out.
         links: where sections have a list of their own, by name; a key that holds one leads there.
     """
     schema = section.model_json_schema()
@@ -165,7 +168,7 @@ def key_rows(section: type[Section], links: Mapping[str, str]) -> Iterator[str]:
 
 
 def _parts(node: Any, key: str) -> Iterator[dict[str, Any]]:
-    """Parts of a JSON schema with a key."""
+    """Yield each dict in a JSON schema that has this key, outer ones first."""
     if isinstance(node, dict):
         if key in node:
             yield node
@@ -181,7 +184,7 @@ def _range(number: Mapping[str, float]) -> str:
 
 
 def _default(value: Any) -> str:
-    """Default of an optional key, in words of YAML."""
+    """Return the default of an optional key as YAML; "optional" for None, a dict, an empty list."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list) and value:
@@ -190,13 +193,13 @@ def _default(value: Any) -> str:
 
 
 def section_names(kind: type[Section] = Section) -> dict[str, type[Section]]:
-    """All sections of the schema by name."""
+    """Return name -> class of a section and its subclasses; of all sections by default."""
     below = [section_names(one) for one in kind.__subclasses__()]
     return {kind.__name__: kind} | {name: one for names in below for name, one in names.items()}
 
 
 def list_places(pages: Mapping[Path, str]) -> dict[str, tuple[Path, str]]:
-    """Page and anchor of each list of keys, by the name of its section."""
+    """Return section -> (page, anchor of the heading) of each list of keys in these pages."""
     places = {}
     for page, text in pages.items():
         anchor = ""
@@ -209,14 +212,14 @@ def list_places(pages: Mapping[Path, str]) -> dict[str, tuple[Path, str]]:
 
 
 def section_rows(name: str, links: Mapping[str, str]) -> Iterable[str]:
-    """Lines of a generated section of a page, by its name."""
+    """Return the lines of a page's generated section by its name; ``links`` as in `key_rows`."""
     if name.startswith("keys "):
         return key_rows(section_names()[name.removeprefix("keys ")], links)
     return TABLES_OF_PAGES[name]()
 
 
 def column_rows(columns: Mapping[str, str], head: str = "column | what") -> Iterator[str]:
-    """Table of names, each with what it is."""
+    """Yield a Markdown table of names, each with what it is, under this head."""
     yield f"| {head} |"
     yield "|---|---|"
     for column, text in columns.items():
@@ -224,7 +227,7 @@ def column_rows(columns: Mapping[str, str], head: str = "column | what") -> Iter
 
 
 def profile_rows() -> Iterator[str]:
-    """Table of the profiles of AUTOSAR E2E."""
+    """Yield the Markdown table of the profiles of AUTOSAR E2E."""
     yield "| `profile` | needs | header | counter | CRC |"
     yield "|---|---|---|---|---|"
     for name, one in PROFILES.items():
@@ -233,7 +236,7 @@ def profile_rows() -> Iterator[str]:
 
 
 def step_rows() -> Iterator[str]:
-    """Table of the steps of a commissioning."""
+    """Yield the Markdown table of the steps of a commissioning."""
     yield "| step | what it does | writes | open again after |"
     yield "|---|---|---|---|"
     for step in STEPS:
@@ -263,7 +266,7 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
 
 
 def generated(root: Path) -> dict[Path, str]:
-    """Texts of all files with generated parts, as they should be."""
+    """Return path -> text as it should be of all DBC files and pages with generated parts."""
     files = {
         path: with_value_tables(path.read_text(encoding="utf-8"), TABLES)
         for path in sorted((root / "dbc").glob("*.dbc"))

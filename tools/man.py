@@ -52,13 +52,13 @@ runs
 
 
 def escaped(text: str) -> str:
-    """Text that roff shows as it is."""
+    """Return text with what roff would take as a command escaped."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return re.sub(r"(?m)^(?=[.'])", r"\\&", text)
 
 
 def paragraphs(help_text: str) -> Iterator[str]:
-    """Sections of the help of a verb; examples are as they are pasted."""
+    """Yield the help of a verb as roff, paragraph by paragraph; examples keep their lines."""
     for paragraph in help_text.split("\n\n"):
         if paragraph == "Examples:":
             yield ".SH EXAMPLES"
@@ -69,13 +69,13 @@ def paragraphs(help_text: str) -> Iterator[str]:
 
 
 def heading(name: str, summary: str) -> Iterator[str]:
-    """Title and name."""
+    """Yield the title and the section NAME of a page, as roff."""
     yield f'.TH "{name.upper()}" 1 "" canshaper "User commands"'
     yield f".SH NAME\n{escaped(name)} \\- {escaped(summary)}"
 
 
 def page(command: Any, context: Any) -> Iterator[str]:
-    """Lines of the page of a verb."""
+    """Yield the page of a verb as roff; ``command`` and ``context`` are click's."""
     summary, _, rest = command.help.partition("\n\n")
     yield from heading(f"canshaper-{context.info_name}", " ".join(summary.split()).rstrip("."))
     pieces = escaped(" ".join(command.collect_usage_pieces(context)))
@@ -92,7 +92,7 @@ def page(command: Any, context: Any) -> Iterator[str]:
 
 
 def overview(group: Any, context: Any) -> Iterator[str]:
-    """Lines of the page of the program."""
+    """Yield the page of the program as roff, with a line for each verb."""
     yield from heading("canshaper", group.help.rstrip("."))
     yield ".SH SYNOPSIS\n.B canshaper\n.I COMMAND\n[OPTIONS] [ARGUMENTS]"
     yield ".SH DESCRIPTION\nReads joystick frames from CAN, shapes each axis of a crane and writes"
@@ -106,7 +106,7 @@ def overview(group: Any, context: Any) -> Iterator[str]:
 
 
 def written(directory: Path) -> list[Path]:
-    """Write all of them."""
+    """Write every page into a directory, delete old ones (canshaper*.1) in it; return the pages."""
     group: Any = typer.main.get_command(app)
     context = typer.Context(group, info_name="canshaper")
     texts = {"canshaper": overview(group, context)}

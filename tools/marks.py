@@ -10,19 +10,19 @@ STAMP = re.compile(r"Commit `[0-9a-f]{7,40}`")
 
 
 def marked(page: str, kind: str) -> list[str]:
-    """Names of the sections of a kind, ``generated`` or ``measured``, in their order."""
+    """Return the names of a page's ``generated`` or ``measured`` sections, in their order."""
     return re.findall(rf"^<!-- {kind}: (.*?) -->$", page, re.MULTILINE)
 
 
 def section_lines(page: str, kind: str, name: str) -> list[str]:
-    """Lines of one section, without empty ones; none where its end is missing."""
+    """Return the lines of one section, without empty ones; none if begin or end is missing."""
     _, _, rest = page.partition(f"<!-- {kind}: {name} -->\n")
     lines, end, _ = rest.partition(f"<!-- end: {name} -->\n")
     return [line for line in lines.splitlines() if line] if end else []
 
 
 def with_sections(page: str, sections: Mapping[str, Iterable[str]], kind: str = "generated") -> str:
-    """Text of a page with the lines of its sections of a kind, by their names.
+    """Return a page with these lines in its sections of a kind, name -> lines; others stay.
 
     Raises:
         ValueError: a section has no begin or no end.
@@ -38,10 +38,10 @@ def with_sections(page: str, sections: Mapping[str, Iterable[str]], kind: str = 
 
 
 def stamped(*sources: str) -> str:
-    """The commit that a measured table was made at.
+    """Return "Commit `ID`" of HEAD, for a table that was measured with these sources.
 
     Raises:
-        SystemExit: these sources are not as the commit has them.
+        SystemExit: a source differs from the commit, or git does not know it.
     """
 
     def git(*words: str) -> str:

@@ -23,7 +23,11 @@ Place = tuple[int, int]  # line and column
 
 
 def explained(survivors: Path) -> dict[str, str]:
-    """Survivors with their reasons: names, a line each, and under them, indented, the reason."""
+    """Return name -> reason of a file: names, a line each, and under them, indented, the reason.
+
+    Raises:
+        SystemExit: names without a reason, a reason without names, or a name twice.
+    """
     entries: dict[str, str] = {}
     for block in survivors.read_text().split("\n\n"):
         lines = [line for line in block.splitlines() if not line.startswith("#")]
@@ -39,7 +43,7 @@ def explained(survivors: Path) -> dict[str, str]:
 
 
 def numbered(changes: Iterable[tuple[str, str]]) -> list[str]:
-    """Name the mutants of one function, each a pair of its source before and after the change."""
+    """Name a function's mutants, each (source before, after); they are numbered by place."""
     placed = [operator(*change) for change in changes]
     seen: Counter[str] = Counter()
     names = [""] * len(placed)
@@ -51,7 +55,7 @@ def numbered(changes: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def operator(before: str, after: str) -> tuple[str, Place]:
-    """Change of a function, and where it is."""
+    """Name the change of a function; return the name and its place in the source."""
     old, new = tokens(before), tokens(after)
     changed = [pair for pair in zip(old, new, strict=False) if pair[0].string != pair[1].string]
     place = changed[0][0].start if changed else old[-1].start
@@ -64,7 +68,7 @@ def operator(before: str, after: str) -> tuple[str, Place]:
 
 
 def tokens(source: str) -> list[tokenize.TokenInfo]:
-    """Tokens that mean something."""
+    """Return the tokens of a source without comments, line ends and indents."""
     spaces = (tokenize.NL, tokenize.COMMENT, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
     read = tokenize.generate_tokens(io.StringIO(source).readline)
     return [token for token in read if token.type not in spaces]
@@ -88,7 +92,7 @@ def of_token(old: tokenize.TokenInfo, new: tokenize.TokenInfo) -> str:
 
 
 def same(one: object, other: object) -> bool:
-    """Whether two pieces of syntax are the same."""
+    """Return whether two pieces of syntax, lists or values are the same, wherever they stand."""
     if isinstance(one, ast.AST) and isinstance(other, ast.AST):
         return ast.dump(one) == ast.dump(other)
     if isinstance(one, list) and isinstance(other, list):
@@ -99,7 +103,7 @@ def same(one: object, other: object) -> bool:
 def difference(
     old: ast.AST, new: ast.AST, parent: ast.AST | None
 ) -> tuple[ast.AST, ast.AST, ast.AST | None]:
-    """Go down to the smallest piece that differs, and what it is a piece of."""
+    """Return the smallest piece that differs, old and new, and the old piece that holds it."""
     if type(old) is not type(new):
         return old, new, parent
     differing: list[tuple[object, object]] = []
@@ -118,7 +122,7 @@ def difference(
 
 
 def of_node(old: ast.AST, new: ast.AST, parent: ast.AST | None) -> str:  # noqa: PLR0911
-    """Name a change of more than one token."""
+    """Name a change of more than one token; ``parent`` is the old piece that holds ``old``."""
     match old, new:
         case ast.UnaryOp(op=ast.Not() | ast.Invert(), operand=inner), _ if same(inner, new):
             return "not left out"
@@ -149,7 +153,7 @@ def of_node(old: ast.AST, new: ast.AST, parent: ast.AST | None) -> str:  # noqa:
 
 
 def holder(old: ast.AST, parent: ast.AST | None) -> str:
-    """Name what got None in place of its value."""
+    """Name the argument, lambda or value that became None."""
     match parent:
         case ast.keyword(arg=name):
             return f"argument {name}"
@@ -162,13 +166,13 @@ def holder(old: ast.AST, parent: ast.AST | None) -> str:
 
 
 def left_out(old: list[ast.AST], new: list[ast.AST]) -> int:
-    """Index of the element that a shorter list lacks."""
+    """Return the index of the element that a shorter list lacks."""
     pairs = enumerate(zip(old, new, strict=False))
     return next((i for i, (one, other) in pairs if not same(one, other)), len(new))
 
 
 def argument(old: ast.Call, new: ast.Call) -> str:
-    """Name of the argument that a call lacks, or its place."""
+    """Return the keyword that a call lacks, or the place (from 1) of a positional argument."""
     if len(old.args) > len(new.args):
         return str(1 + left_out(list(old.args), list(new.args)))
     if len(old.keywords) > len(new.keywords):

@@ -20,14 +20,14 @@ FAILED, UNREACHED = 1, 33  # as mutmut counts: a test failed; none of the tests 
 class Forks:
     """pytest plugin: instead of running the tests, run those of each mutant in a fork.
 
-    What has killed most mutants of the same function goes first, then what takes least.
+    The test that has killed most mutants of the same function goes first, then the shortest.
 
     Args:
         mutants: mutmut's names.
         processes: how many at a time.
 
     Attributes:
-        exit_codes: of each mutant.
+        exit_codes: by mutant: FAILED, UNREACHED, 0 if it survived, minus a signal of a time limit.
     """
 
     def __init__(self, mutants: list[str], processes: int) -> None:
@@ -38,7 +38,7 @@ class Forks:
         self._killed: defaultdict[str, Counter[str]] = defaultdict(Counter)  # by function and test
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run the tests of every mutant."""
+        """Run the tests of every mutant that reach its function; True: pytest runs none itself."""
         gc.freeze()  # else each fork copies what it collects
         for number, name in enumerate(self._mutants, 1):
             function = mangled_name_from_mutant_name(name)
@@ -81,24 +81,24 @@ class Forks:
 
 
 class Verdict:
-    """pytest plugin of a fork: ends it at the first failure, or where a loop never ends.
+    """pytest plugin of a fork: ends its process, with FAILED, at the first test that fails.
 
     Args:
-        killer: file that gets the name of the test that failed.
+        killer: file that gets the name of that test.
     """
 
     def __init__(self, killer: Path) -> None:
         self._killer = killer
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """One test that fails is enough."""
+        """End the process where a test has failed."""
         if report.failed:
             self._killer.write_text(report.nodeid)
             os._exit(FAILED)
 
 
 def _run(name: str, items: list[pytest.Item], killer: Path) -> None:
-    """Run the tests with a mutant; does not return."""
+    """Run the tests with a mutant; end the process: 0, FAILED, or a signal of a time limit."""
     try:
         set_mutant_under_test(name)
         items[0].config.pluginmanager.register(Verdict(killer))

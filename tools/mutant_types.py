@@ -22,10 +22,10 @@ REFUSALS = frozenset(
 
 
 def refused(sources: list[Path]) -> set[str]:
-    """Return mutmut's names of the mutants in these files that mypy refuses.
+    """Return mutmut's names of the mutants in these files with an error of REFUSALS by mypy.
 
     Raises:
-        RuntimeError: mypy failed, or refuses what is no mutant.
+        RuntimeError: mypy failed, or such an error is in no mutant.
     """
     command = [sys.executable, "-m", "mypy", "--output=json", *map(str, sources)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -48,7 +48,7 @@ def refused(sources: list[Path]) -> set[str]:
 
 
 def mutants(source: Path) -> Iterator[tuple[str, range]]:
-    """Yield the name and the lines of each mutant in a file."""
+    """Yield the function name and the lines of each mutant in a file that mutmut wrote."""
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef) and re.search(r"__mutmut_\d+$", node.name):
             assert node.end_lineno is not None

@@ -44,7 +44,7 @@ KILLED = {
 
 
 class Mutant(NamedTuple):
-    """One change: where its exit code is, mutmut's name for it, ours, and the source with it."""
+    """One change: mutmut's record and key of it, our name, the function without and with it."""
 
     data: SourceFileMutationData
     key: str
@@ -53,12 +53,12 @@ class Mutant(NamedTuple):
     after: str
 
     def save(self, exit_code: int) -> None:
-        """Keep the exit code of its tests."""
+        """Write the exit code of its tests into mutmut's file."""
         self.data.exit_code_by_key[self.key] = exit_code
         self.data.save()
 
     def difference(self) -> str:
-        """Lines that changed."""
+        """Return the lines that changed, as a diff without context."""
         lines = unified_diff(self.before.splitlines(), self.after.splitlines(), n=0)
         return "\n".join(line.rstrip() for line in list(lines)[3:])
 
@@ -67,20 +67,20 @@ class Mutant(NamedTuple):
 
 
 def negated(node: cst.If) -> Iterator[cst.If]:
-    """Turn a condition round."""
+    """Yield an ``if`` with its condition negated."""
     test = node.test.with_changes(lpar=[cst.LeftParen()], rpar=[cst.RightParen()])
     yield node.with_changes(test=cst.UnaryOperation(cst.Not(), test))
 
 
 def swapped(node: cst.Call) -> Iterator[cst.Call]:
-    """Take the smaller of two where the larger was meant."""
+    """Yield ``max`` for a call of ``min`` and ``min`` for ``max``; nothing for another call."""
     other = {"min": "max", "max": "min"}
     if isinstance(node.func, cst.Name) and node.func.value in other:
         yield node.with_changes(func=cst.Name(other[node.func.value]))
 
 
 def left_out(node: cst.Expr | cst.Raise | cst.Return) -> Iterator[cst.Pass]:
-    """Leave out a call, a refusal, or a way out."""
+    """Yield ``pass`` for a call on its own, a raise, or a return of nothing; else nothing."""
     call = isinstance(node, cst.Expr) and isinstance(node.value, cst.Call)
     way_out = isinstance(node, cst.Return) and node.value is None
     if call or way_out or isinstance(node, cst.Raise):
@@ -97,12 +97,12 @@ MORE = (
 
 
 def run(processes: int, patterns: list[str], known: Collection[str] | None = None) -> int:
-    """Make the mutants and run the tests of each.
+    """Make the mutants in ./mutants, which must not exist, and run the tests of each.
 
     Args:
         processes: how many at a time.
         patterns: names of mutants; none for all.
-        known: survivors that are not run again, as each needs every test.
+        known: survivors that are not run again, as each needs every test; None to run all.
 
     Returns:
         Exit code of pytest.
@@ -137,7 +137,7 @@ def run(processes: int, patterns: list[str], known: Collection[str] | None = Non
 
 
 def mutants() -> Iterator[Mutant]:
-    """Every mutant."""
+    """Yield every mutant that mutmut has written in the working directory."""
     for path in walk_mutatable_files():
         data = SourceFileMutationData(path=path)
         data.load()
@@ -151,7 +151,7 @@ def mutants() -> Iterator[Mutant]:
 
 
 def source_of(key: str, path: Path) -> tuple[str, str]:
-    """Source of a function before and after a mutant."""
+    """Return the source of a mutant's function, before and after the change."""
     functions = read_functions_from_index(key, path)
     assert functions, f"mutmut has no lines of {key}"
     before, after = (cst.Module([function]).code.strip() + "\n" for function in functions)
@@ -159,13 +159,17 @@ def source_of(key: str, path: Path) -> tuple[str, str]:
 
 
 def function_of(mutant: str) -> str:
-    """Name a function as Python does: canshaper.shaping.axis.xǁAxisǁact__mutmut_3 is Axis.act."""
+    """Name a mutant's function as Python does: axis.xǁAxisǁact__mutmut_3 gives axis.Axis.act."""
     name = re.sub(r"__mutmut_\d+$", "", mutant)
     return re.sub(r"xǁ(\w+)ǁ", r"\1.", name).replace(".x_", ".")
 
 
 def judge(known: dict[str, str], patterns: list[str]) -> int:
-    """Print the result; 0 when every survivor has its reason, and every reason its survivor."""
+    """Print the result; return 0 if every survivor has a reason, and every reason its survivor.
+
+    A mutant that no test reaches, or none at all, gives 1. With patterns only mutants that they
+    name count, and a reason without a mutant is not looked for.
+    """
     counts: Counter[str] = Counter()
     seen: set[str] = set()
     failures = 0

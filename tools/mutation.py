@@ -66,12 +66,12 @@ GATE = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["coverage"][
 
 
 def modules(group: str) -> list[str]:
-    """Modules of the coverage gate in a room."""
+    """Return the names of a room's modules that pyproject.toml lists for coverage."""
     return [name for name in GATE["source_pkgs"] if name.split(".")[1] == group]
 
 
 def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
-    """Copy what the tests need and say there what mutmut shall do."""
+    """Make ``work`` anew: a copy of what the tests need, with the settings of mutmut."""
     shutil.rmtree(work, ignore_errors=True)
     for name in (*COPIED, "tests"):
         ignore = shutil.ignore_patterns("__pycache__")
@@ -99,7 +99,7 @@ use_git_change_detection = false
 
 
 def run(group: str, patterns: list[str], processes: str, *, new: bool) -> int:
-    """Prepare, run and judge one group; ``new``: without the survivors that are explained."""
+    """Prepare, run, judge a group; return the exit status. ``new``: without explained survivors."""
     work = ROOT / "out/mutation" / group
     start = time.monotonic()
     if group == "core":

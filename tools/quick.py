@@ -31,7 +31,7 @@ OPTIONS = ["-q", "-m", "not slow and not processes", "--hypothesis-profile=few"]
 
 
 def changed(base: str) -> list[Path]:
-    """Files that differ from where this branch left ``base``, those that git does not know too."""
+    """Return files that differ from where this branch left ``base``, and those not in git."""
 
     def git(*words: str) -> list[str]:
         done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True)
@@ -43,7 +43,7 @@ def changed(base: str) -> list[Path]:
 
 
 def tests_of(file: Path) -> list[str]:
-    """Tests of the room that a file is in, the innermost that has some."""
+    """Return the paths below tests/ for a file: the test itself, its room's, or none."""
     first, *rest = file.parts
     if first == "tests" and file.name.startswith("test_"):
         return ["/".join(rest)]
@@ -56,7 +56,7 @@ def tests_of(file: Path) -> list[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the tests, side by side on every processor; return pytest's status."""
+    """Run the tests that a BASE or --all chooses, on every processor; return pytest's status."""
     if arguments == ["--all"]:
         chosen = set(DAEMON)
     else:

@@ -16,10 +16,10 @@ class Row(NamedTuple):
     """Claims about the reaction to a fault.
 
     Attributes:
-        ids: names of reasons or faults, or a number.
+        ids: names of reasons or faults, with commas between, or a number such as R1.
         what: the fault, where its name does not say it, and what else happens.
-        tests: as tests/docs/test_claims.py reads them.
-        within: longest time until the reaction.
+        tests: ROOM/FILE or ROOM/FILE::WORDS of a test's name, with blanks between.
+        within: longest time until the reaction, such as "T + tick"; T: timeout of a joystick.
         reaction: where no reason decides it.
     """
 
@@ -270,15 +270,15 @@ ROWS = (
 
 
 def quoted(tests: str) -> str:
-    """Return names of tests as the page has them."""
+    """Return names of tests, with blanks between, each in backquotes."""
     return " ".join(f"`{one}`" for one in tests.split())
 
 
 def reaction_rows() -> Iterator[str]:
-    """Table of the reactions.
+    """Yield the Markdown table of the reactions.
 
     Raises:
-        ValueError: a reason says another reaction than its row.
+        ValueError: reasons and text of a row say several reactions, or none.
     """
     yield "| claim | fault | reaction | within | tests |"
     yield "|---|---|---|---|---|"

@@ -7,8 +7,8 @@
 
 A part whose kernel, browser or program is not here and cannot be installed stands in the table with
 the reason. The output of each part is kept in out/suite. JOBS=4 runs four processes side by side;
-without it there are as many as processors. Exit status: 0 where all that ran is green and `fast`
-was not left out for want of something, 1 otherwise, 130 after Ctrl-C.
+without it there are as many as processors. Exit status: 0 where all that ran is green, 1 otherwise,
+2 for an unknown part, 130 after Ctrl-C.
 """
 
 import argparse
@@ -32,14 +32,14 @@ GRACE_S = 20.0  # for processes that are interrupted
 
 
 class Runner:
-    """Runs rows of parts; ends their processes where it is interrupted."""
+    """Runs rows of parts; `end` ends their processes."""
 
     def __init__(self) -> None:
         self._running: list[subprocess.Popen[str]] = []
         self._show = threading.Lock()
 
     def run(self, row: Sequence[Part]) -> None:
-        """Run the parts of a row side by side; the first one is shown as it runs."""
+        """Run the parts of a row side by side; show the first as it runs, others when they end."""
         threads = [threading.Thread(target=self._part, args=(p, p is row[0])) for p in row]
         for thread in threads:
             thread.start()
@@ -96,7 +96,7 @@ class Runner:
             return process.wait()
 
     def end(self) -> None:
-        """Interrupt what still runs; end it where that does not."""
+        """Interrupt what still runs, as Ctrl-C does; kill it after 20 s."""
         still = [process for process in self._running if process.poll() is None]
         for process in still:
             _signal(process, signal.SIGINT)
@@ -113,7 +113,7 @@ def _signal(process: subprocess.Popen[str], number: signal.Signals) -> None:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """SIGTERM is as Ctrl-C."""
+    """Let SIGTERM raise KeyboardInterrupt meanwhile, as Ctrl-C does."""
 
     def on_signal(number: int, _: object) -> None:
         raise KeyboardInterrupt(number)
@@ -126,7 +126,7 @@ def interruptible() -> Iterator[None]:
 
 
 def run(rows: Sequence[Sequence[Part]]) -> None:
-    """Prepare what the parts need, then run them row by row."""
+    """Prepare what the parts need; run, row by row, those that have it."""
     OUT.mkdir(parents=True, exist_ok=True)
     parts = [part for row in rows for part in row]
     answers: dict[Callable[[], str | None], str | None] = {}
@@ -148,7 +148,7 @@ def run(rows: Sequence[Sequence[Part]]) -> None:
 
 
 def table(parts: Sequence[Part]) -> str:
-    """Return the table, what failed, what was skipped and why."""
+    """Return the table, then lines of what was not run, skipped or failed, and the sums."""
     form = "{:14} {:>7} {:>7} {:>8} {:>8}  {}"
     lines = [form.format("part", "passed", "failed", "skipped", "seconds", "result")]
     for part in parts:
@@ -171,7 +171,7 @@ def table(parts: Sequence[Part]) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the parts that are asked for; return the exit status."""
+    """Run or list the parts that the arguments ask for; return the exit status."""
     text = (__doc__ or "").partition("\n\n")
     parser = argparse.ArgumentParser(
         description=text[0], epilog=text[2], formatter_class=argparse.RawDescriptionHelpFormatter

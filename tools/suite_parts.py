@@ -28,7 +28,7 @@ Command = list[str]
 
 
 def pytest(*arguments: str) -> Command:
-    """Return the command of a run of pytest; without paths of all tests that need no kernel."""
+    """Return the command of pytest; without a path, on all tests but kernel and browser."""
     paths = [] if any(word.startswith("tests/") for word in arguments) else ["tests", "studies"]
     ignored = ["--ignore=tests/hil", "--ignore=tests/systemd"]
     ignored = [*ignored, "--ignore-glob=*/test_browser*.py"] if paths else []
@@ -36,7 +36,7 @@ def pytest(*arguments: str) -> Command:
 
 
 def hil(names: str, *arguments: str) -> Command:
-    """Return the command that runs files of tests/hil, in the machine that has its own time."""
+    """Return the command that runs tests/hil/test_NAME.py where a busy host makes nothing late."""
     files = [f"tests/hil/test_{name}.py" for name in names.split()]
     return [sys.executable, "-m", "tests.lane.hil", "--steady", "-q", *arguments, *files]
 
@@ -48,7 +48,7 @@ def browser(*arguments: str) -> Command:
 
 
 def no_lane() -> str | None:
-    """Prepare the lane of SocketCAN; return why there is none, if so."""
+    """Prepare a kernel with SocketCAN, this or an emulated one; return why not, None if done."""
     command = [sys.executable, "-m", "tests.lane", "--prepare"]
     done = subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, check=False)
     print(done.stderr, end="", flush=True)
@@ -56,7 +56,7 @@ def no_lane() -> str | None:
 
 
 def _no_program(tools: dict[str, str]) -> str | None:
-    """Install the Debian packages of absent programs; return why they cannot be had, if so."""
+    """Install absent programs (program -> Debian package); return why not, or None if they are."""
     try:
         with cache_lock():
             install(missing(tools))
@@ -66,12 +66,12 @@ def _no_program(tools: dict[str, str]) -> str | None:
 
 
 def no_chromium() -> str | None:
-    """Install Chromium where it is absent; return why there is none, if so."""
+    """Install Chromium where it is absent; return why not, or None if it is there."""
     return _no_program({"chromium": "chromium"})
 
 
 def no_target() -> str | None:
-    """Install compiler and emulator of a Cortex-M; return why there are none, if so."""
+    """Install compiler and emulator of a Cortex-M; return why not, or None if they are there."""
     tools = {"qemu-system-arm": "qemu-system-arm", "arm-none-eabi-gcc": "gcc-arm-none-eabi"}
     if not NEWLIB.exists():  # the compiler's package only recommends it
         tools["its C library"] = "libnewlib-arm-none-eabi"
@@ -83,7 +83,7 @@ NEWLIB = Path("/usr/lib/arm-none-eabi/newlib")
 
 
 def no_foreign() -> str | None:
-    """Install what reads exports of others' kinds apart; return why it cannot be had, if so.
+    """Install what reads MF4, FMU and MCAP into .venv/foreign; return why not, or None if done.
 
     Wherever python-can finds asammdf, every start takes a third of a second more.
     """
@@ -99,7 +99,7 @@ def no_foreign() -> str | None:
 class Part:
     """Commands that belong together, and what became of them.
 
-    ``absent`` prepares what the part needs and returns why that cannot be had here.
+    ``absent`` prepares what the part needs and returns why that cannot be had here, or None.
     """
 
     name: str
@@ -116,13 +116,13 @@ class Part:
 
     @property
     def result(self) -> str:
-        """Word for the table."""
+        """The word of the table: ok, FAILED, not run, not ended."""
         if self.not_run is not None:
             return "not run"
         return "not ended" if self.status is None else "FAILED" if self.status else "ok"
 
     def note(self, line: str) -> None:
-        """Take from a line of output what the table shows."""
+        """Count what a line of pytest says: sums, a failed test, skipped ones with their reason."""
         if skipped := SKIPPED.match(line):
             self.skipped[skipped[2].partition(": ")[2] or skipped[2]] += int(skipped[1])
         elif FAILED.match(line):

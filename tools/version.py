@@ -1,7 +1,8 @@
 """The version, from the tags of git: ``v1.2.0``, and ``1.2.1.dev5+gabcdef0`` five commits later.
 
-A clone without tags counts from the newest release in CHANGELOG.md; a source distribution carries
-its version in PKG-INFO. Hatch reads ``__version__``; run by itself this prints it.
+A clone without tags takes the newest release in CHANGELOG.md and counts all its commits; a source
+distribution carries its version in PKG-INFO. Hatch reads ``__version__``; run by itself this prints
+it.
 """
 
 import re
@@ -20,7 +21,7 @@ def _git(*words: str) -> str:
 
 
 def _next(tag: str, commits: str, commit: str) -> str:
-    """Version after a tag: development versions of the next one stand before it."""
+    """Return the tag itself for 0 commits, else a development version of the release after it."""
     if commits == "0":
         return tag
     *first, last = tag.split(".")
@@ -28,7 +29,7 @@ def _next(tag: str, commits: str, commit: str) -> str:
 
 
 def version() -> str:
-    """Version of this tree.
+    """Return the version of this tree.
 
     Raises:
         RuntimeError: it is neither a clone nor a source distribution.

@@ -15,10 +15,10 @@ class EndParameters:
     """End stops of every axis: hard by default, or with a cushion ahead of each stop.
 
     A cushion throttles the oil over the last part of the stroke. A profiled cushion brakes with a
-    constant deceleration, which gives the least peak pressure: it bounds the speed by the square
-    root of the way left to the stop. On the way back a check valve bypasses the cushion. Cylinders
-    have 20 to 50 mm of cushion, which a crane at full speed passes in 0.1 to 0.3 s (catalogues;
-    Hydraulic Trainer, Rexroth).
+    constant deceleration, which gives the least peak pressure: the largest speed falls with the
+    square root of the way left to the stop, down to ``creep``. On the way back a check valve
+    bypasses the cushion. Cylinders have 20 to 50 mm of cushion, which a crane at full speed passes
+    in 0.1 to 0.3 s (catalogues; Hydraulic Trainer, Rexroth).
     """
 
     cushion_s: float = 0.0  # length of the cushion, in s of full speed; 0: none
@@ -29,16 +29,16 @@ class EndParameters:
 
 
 class Actuator:
-    """A valve times a full speed, between two end stops.
+    """A coordinate between two end stops; its speed is the output of its valve times a full speed.
 
     `advance` computes position and speed at the middle and the end of a step and acceleration at
     start, middle and end. At a stop the oil goes over the relief valve: the valve runs on, the
     coordinate stands still. A cushion before the stop bounds the speed. The middle acceleration is
     chosen so that Simpson's rule gives the true change of speed; a stop, or a spool that arrives
     within the step, thus gives the grapple its exact impulse instead of a spike that depends on
-    where the stages fall.
+    where the stages of its Runge-Kutta step fall.
 
-    Units are those of the coordinate: rad or m, per second.
+    Positions are in rad or m, speeds in these per s, accelerations per s^2.
     """
 
     __slots__ = (
@@ -83,11 +83,11 @@ class Actuator:
 
     @property
     def room_s(self) -> float:
-        """Time in seconds that the coordinate needs at full speed to its upper end stop."""
+        """Time in s that the coordinate needs at full speed to its upper end stop."""
         return (self._high - self.position) / self._full_speed
 
     def advance(self, step_s: float) -> None:
-        """Move on by step_s seconds."""
+        """Move valve and coordinate on by step_s seconds."""
         full_speed = self._full_speed
         start = self.position
         start_speed = self.speed
@@ -137,7 +137,7 @@ class Actuator:
     def _most_speeds(
         self, cushion: EndParameters, towards: float, step_s: float
     ) -> tuple[float, float]:
-        """Return the largest speeds in the middle and at the end of a step in this direction."""
+        """Return the cushion's largest speeds at middle and end of a step, by `towards`' sign."""
         full_speed = self._full_speed
         room = self._high - self.position if towards > 0.0 else self.position - self._low
         # sqrt(room) falls in a straight line, and so does the speed.

@@ -59,18 +59,17 @@ ON_ROPE: Final = (OVERHEAD, TOWER, LUFFING)
 
 
 def reported_in(message: str, signals: Mapping[str, str]) -> dict[str, str]:
-    """Return the signals of a message, by axis, out of SPEED_SIGNALS or SWAY_SIGNALS."""
+    """Return axis -> signal of those `signals` (axis -> MESSAGE.SIGNAL) that this message has."""
     pairs = ((axis, name.split(".")) for axis, name in signals.items())
     return {axis: signal for axis, (of, signal) in pairs if of == message}
 
 
 def kind_of(axes: Iterable[str]) -> str:
-    """Return the kind of crane whose axes move these coordinates.
+    """Return the kind of crane whose axes move these coordinates; the first that fits counts.
 
-    A crane with a boom joint other than slew is driven joint by joint, or is a luffing crane if it
-    also has a hoist. A crane that slews or moves its tip outwards and has a hoist is a tower crane.
-    Any other crane with a bridge, trolley or hoist is an overhead crane. Every other crane moves
-    its tip.
+    With a boom joint other than slew it is a luffing crane if it has a hoist, else driven joint by
+    joint. With slew or near_far it is a tower crane if it has a hoist, else moved by its tip. With
+    a bridge, trolley or hoist it is an overhead crane. Any other is moved by its tip.
     """
     moved = {*axes}
     if moved & {*JOINT_AXES} - {SLEW}:

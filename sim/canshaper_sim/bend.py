@@ -35,7 +35,8 @@ class Bend:
         parameters: frequency and damping of the boom; the frequency is not 0.
 
     Attributes:
-        slew, radius, height: (u, u') of this coordinate, in rad and rad/s or m and m/s.
+        slew, radius, height: (lead over the stiff boom, its rate) in this coordinate, rad and rad/s
+            or m and m/s.
     """
 
     __slots__ = ("_damping", "_stiffness", "height", "radius", "slew")
@@ -48,7 +49,7 @@ class Bend:
     def advance(
         self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion]
     ) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Let step_s seconds pass; return the motion of the tip, given that of the stiff boom."""
+        """Let step_s seconds pass; add the bend to the stiff boom's motion (start, middle, end)."""
         slew = self._points(self.slew, [tip.slew_acceleration_rad_s2 for tip in tips], step_s)
         radius = self._points(self.radius, [tip.radius_acceleration_m_s2 for tip in tips], step_s)
         height = self._points(self.height, [tip.height_acceleration_m_s2 for tip in tips], step_s)

@@ -14,7 +14,7 @@ STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIV
 
 
 class _Node:
-    """A node that boots and becomes operational on a start command, or at once without a master."""
+    """A node that is operational once started by NMT, or at once if canshaper is not the master."""
 
     def __init__(self, bus: str, number: int, timeout_ms: int, *, waits: bool) -> None:
         self._key = bus, HEARTBEAT + number
@@ -31,7 +31,10 @@ class _Node:
 
 
 class _ValveStates:
-    """A valve that steps up one state at a time, or down any number, to the commanded state."""
+    """A CiA 408 valve: a frame moves it one state up, or any number down, to the commanded state.
+
+    It takes frames and sends its status word only while its node is operational.
+    """
 
     def __init__(self, axis: BoundAxis, node: _Node | None) -> None:
         assert axis.status_word
@@ -55,7 +58,7 @@ class _ValveStates:
 
     @property
     def active(self) -> bool:
-        """True while the valve follows its setpoint."""
+        """True while the valve is ACTIVE, and so follows its setpoint."""
         return self._operational and STEPS[self._step] is ValveState.ACTIVE
 
     def receive(self, data: bytes) -> None:
@@ -104,22 +107,22 @@ class CanopenSide:
         return node is None or self._nodes[bus, node].state is NodeState.OPERATIONAL
 
     def closed(self, axis: str) -> bool:
-        """Return whether the valve of an axis ignores its setpoint in its present state."""
+        """Return whether a valve's state ignores its setpoint; False for one without CiA 408."""
         valve = self._valves.get(axis)
         return valve is not None and not valve.active
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame: a valve reads its control word from it, a node its start command."""
+        """Take a frame: the control word of a valve, the start of a node; others are ignored."""
         for valve in self._valves.values():
             if valve.key == frame[:3]:
                 valve.receive(frame.data)
         if frame.can_id == NMT and not frame.extended and frame.data[:1] == bytes((START,)):
             for (bus, _), node in self._nodes.items():
-                if bus == frame.bus and frame.data[1] in (0, node.number):
+                if bus == frame.bus and frame.data[1:2] in (b"\0", bytes((node.number,))):
                     node.state = NodeState.OPERATIONAL
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
-        """Yield the frames that are due once passed_s more seconds have passed."""
+        """Let passed_s seconds pass; yield each heartbeat and status word that is due, once."""
         parts: list[_Node | _ValveStates] = [*self._nodes.values(), *self._valves.values()]
         for part in parts:
             yield from part.frames(passed_s)

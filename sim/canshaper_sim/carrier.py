@@ -75,13 +75,13 @@ class Carrier:
         self._bends = (0.0, 0.0, 0.0)  # roll'', pitch'', height of what hangs
 
     def settle(self, grapple: Grapple, sway: Sway, tip: TipMotion) -> None:
-        """Lean the carrier to its equilibrium under the grapple and the boom."""
+        """Lean a carrier that rocks to its equilibrium under grapple and boom, with no rate."""
         if self._omega:
             roll, pitch = self._leans(grapple, sway, tip)
             self.roll, self.pitch = (roll, 0.0), (pitch, 0.0)
 
     def advance(self, step_s: float, grapple: Grapple, sway: Sway, tip: TipMotion) -> None:
-        """Rock for step_s seconds under the pull of this grapple and the boom."""
+        """Rock for step_s seconds under the pull of grapple and boom; a stiff carrier does not."""
         if not self._omega:
             return
         omega, ratio = self._omega, self._parameters.rock_damping
@@ -93,7 +93,7 @@ class Carrier:
         self._bends = *turned, tip.height_m - grapple.l1_m - grapple.l2_m
 
     def push(self, slew_rad: float, radius_m: float) -> Push:
-        """Return the force on a mass at the tip in N/kg, less that on a level carrier at rest."""
+        """Return what tilt and rocking add to a weight, N/kg: outwards, in slew direction, up."""
         gravity = self._gravity_m_s2
         roll, pitch = self._slope[0] + self.roll[0], self._slope[1] + self.pitch[0]
         fall = math.cos(pitch)

@@ -47,7 +47,7 @@ class ContactParameters:
     def accelerations(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """Return the contact's part of (theta5'', theta6''), rad/s^2; see `accelerations`."""
+        """Return what contact adds to (theta5'', theta6''), rad/s^2; zeros if there is none."""
         theta5, theta6, rate5, rate6 = sway
         s5, c5, s6, c6 = math.sin(theta5), math.cos(theta5), math.sin(theta6), math.cos(theta6)
         below = grapple.l2_m + self.reach_m
@@ -81,7 +81,10 @@ class ContactParameters:
     def _surface(
         self, outwards: float, across: float, slew_rad: float
     ) -> tuple[tuple[float, float], float]:
-        """Return slope outwards and in slew direction, and height in m, of the surface there."""
+        """Return (slope outwards, in slew direction) and height (m) of the surface below a point.
+
+        The point lies `outwards` from the pillar and `across` in slew direction, m.
+        """
         if not self.pile_height_m:
             return (0.0, 0.0), self.ground_m
         # The middle of the pile, seen from the boom.
@@ -98,7 +101,10 @@ class ContactParameters:
     def _force(
         self, depth: float, slope: tuple[float, float], speed: tuple[float, float, float]
     ) -> tuple[float, float, float]:
-        """Return the force on the grapple's end, N: outwards, in slew direction, upwards."""
+        """Return the force in N on the grapple's end, `depth` m below the surface.
+
+        Force and speed (m/s) are outwards, in slew direction and upwards.
+        """
         long = math.hypot(slope[0], slope[1], 1.0)
         normal = (-slope[0] / long, -slope[1] / long, 1.0 / long)
         away = _dot(speed, normal)

@@ -207,7 +207,7 @@ class Crane:
 
         Args:
             parameters: the crane (default: the nominal one).
-            sway: the initial sway (default: none).
+            sway: the initial sway, from where the grapple hangs still (default: none).
             boom: the boom that carries the grapple (default: a `TipBoom` of the parameters).
         """
         p = self.parameters = parameters or CraneParameters()
@@ -242,7 +242,7 @@ class Crane:
 
     @property
     def state(self) -> CraneState:
-        """The present state."""
+        """Present state: the tip of the bent boom; with a long log the sum of both swings."""
         pose = self.boom.pose
         if bend := self._bend:
             ahead, faster = zip(bend.slew, bend.radius, bend.height, strict=True)
@@ -275,11 +275,14 @@ class Crane:
         return self.parameters.grapple.m2_kg - self._empty_kg
 
     def speed(self, axis: str) -> float:
-        """Return the speed of an axis of this crane, rad/s or m/s."""
+        """Return the speed of an axis of this crane, rad/s or m/s; KeyError for another."""
         return self._axes[axis].speed
 
     def opening(self, axis: str) -> float:
-        """Return the opening of the valve of an axis, -1 .. 1; 0 for an axis without one."""
+        """Return the flow through the valve of an axis, fraction of full flow; 0 without a valve.
+
+        It exceeds 1 where a load helps, or a cylinder is faster in the negative direction.
+        """
         moved = self._axes.get(axis)
         return moved.valve.speed if moved else 0.0
 
@@ -290,8 +293,9 @@ class Crane:
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
         """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.
 
-        An axis not in `commands` keeps its last command, as a valve between two frames does.
-        Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
+        An axis not in `commands` keeps its last command, as a valve between two frames does. Any
+        crane takes a command of `rotator`; without a long or askew log it moves nothing. Raises
+        ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
         """
         if not 0.0 < dt_s < math.inf:
             raise ValueError(f"crane: dt_s: expected a positive value, got {dt_s}")
@@ -312,7 +316,7 @@ class Crane:
             self.swung_over = True
 
     def _axis(self, name: str) -> Actuator:
-        """Return an axis that takes commands; raise ValueError for an unknown name."""
+        """Return an axis by name; raise ValueError for an unknown one."""
         if axis := self._axes.get(name):
             return axis
         raise ValueError(f"crane: axis: expected one of {', '.join(self._axes)}, got {name!r}")
@@ -345,7 +349,7 @@ class Crane:
 
 
 def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:
-    """Return a crane driven joint by joint, with its tip at the start of a tip-driven crane.
+    """Return a crane driven joint by joint, its tip at the start pose of the parameters.
 
     Raises:
         DesignError: a joint would start outside its range.
@@ -357,7 +361,7 @@ def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = N
 
 
 class RopeCrane(Crane):
-    """A crane whose load hangs from a rope: an `OverheadBoom`, or a `RopedBoom` by its kind.
+    """A crane whose load hangs from a rope; its kind is overhead, tower or luffing.
 
     It stands level and without wind: only the parameters of its kind, the end stops and the sway
     sensor apply.

@@ -24,7 +24,9 @@ def cranes(deployment: Deployment) -> list[str]:
 
 
 def one_crane(deployment: Deployment, crane: str) -> Deployment:
-    """Return the deployment with one crane's axes under their own names, its joysticks and buses.
+    """Return the deployment of one crane: ``front_slew`` of the crane ``front`` becomes ``slew``.
+
+    Joysticks, switches and buses stay if its axes need them, the emergency stop if its bus stays.
 
     Raises:
         DesignError: the deployment has no such crane.
@@ -33,10 +35,12 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
     if crane not in names:
         expected = f"one of {', '.join(names)}" if names else "none, there is one"
         raise DesignError(f"crane: expected {expected}, got {crane!r}")
+    # A crane whose name begins with this one's has axes of its own.
+    others = tuple(f"{one}_" for one in names if one.startswith(f"{crane}_"))
     axes: dict[str, BoundAxis] = {
         name.removeprefix(f"{crane}_"): axis
         for name, axis in deployment.axes.items()
-        if name.startswith(f"{crane}_")
+        if name.startswith(f"{crane}_") and not name.startswith(others)
     }
     moving = {axis.config.command.joystick for axis in axes.values()}
     # And those whose switches enable them.

@@ -5,10 +5,10 @@ Eq. 7 the gravity and tip factor is (m1 l1 + m2 l3) and theta6' stands to the fi
 equations are solved for the second derivatives, and the dots lost in Eq. 9 are restored. The mass
 matrix is diagonal, so each equation gives its own acceleration.
 
-Frame: the tip is at (x cos theta1, x sin theta1, z), e_r = (cos theta1, sin theta1) points
-outwards along the boom, e_t = (-sin theta1, cos theta1) in slew direction, e_z upwards. With
-l3 = l1 + l2 cos theta6 the grapple (m2) hangs relative to the tip at
--l2 sin(theta6) e_r + l3 sin(theta5) e_t - l3 cos(theta5) e_z, and the link (m1) at
+Frame: the tip is at (x cos theta1, x sin theta1, z), x the radius, theta1 the slew angle, z the
+height; e_r = (cos theta1, sin theta1) points outwards along the boom, e_t = (-sin theta1,
+cos theta1) in slew direction, e_z upwards. With l3 = l1 + l2 cos theta6 the grapple (m2) hangs at
+-l2 sin(theta6) e_r + l3 sin(theta5) e_t - l3 cos(theta5) e_z from the tip, and the link (m1) at
 l1 (sin(theta5) e_t - cos(theta5) e_z). So theta5 > 0 swings in slew direction and theta6 > 0
 swings inwards, towards the pillar.
 """
@@ -40,7 +40,7 @@ class TipMotion(NamedTuple):
 
 
 class Sway(NamedTuple):
-    """State of the two free joints: angles (rad) and their rates (rad/s)."""
+    """Two free joints: theta5 swings in slew direction, theta6 inwards; rad, rates in rad/s."""
 
     theta5_rad: float = 0.0
     theta6_rad: float = 0.0
@@ -118,7 +118,7 @@ class Grapple:
 
 
 def offset_m(l1_m: float, l2_m: float, theta5_rad: float, theta6_rad: float) -> tuple[float, float]:
-    """Return the horizontal offset of the load from the tip, m; a rope has l1_m 0."""
+    """Return the load's offset from the tip, m: outwards, slew direction. A rope has l1_m = 0."""
     l3_m = l1_m + l2_m * math.cos(theta6_rad)
     return -l2_m * math.sin(theta6_rad), l3_m * math.sin(theta5_rad)
 
@@ -126,7 +126,7 @@ def offset_m(l1_m: float, l2_m: float, theta5_rad: float, theta6_rad: float) -> 
 def accelerations(
     grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
 ) -> tuple[float, float]:
-    """Return (theta5'', theta6'') in rad/s^2 for this sway and tip motion (Eq. 7-9, corrected)."""
+    """Return (theta5'', theta6'') in rad/s^2 for a `Sway` and a tip motion (Eq. 7-9, corrected)."""
     theta5, theta6, rate5, rate6 = sway
     radius, radius_rate, radius_acc, slew_rate, slew_acc, height_acc, _, _, _ = tip
     l1 = grapple.l1_m
@@ -171,7 +171,7 @@ Push = tuple[float, float, float]
 def pushed(
     grapple: Grapple, sway: tuple[float, float, float, float], link: Push, load: Push
 ) -> tuple[float, float]:
-    """Return what forces on link and grapple add to `accelerations`, by virtual work; rad/s^2."""
+    """Return what forces (N/kg) on link and grapple add to (theta5'', theta6''), rad/s^2."""
     s5, c5, s6, c6 = math.sin(sway[0]), math.cos(sway[0]), math.sin(sway[1]), math.cos(sway[1])
     l1, l2 = grapple.l1_m, grapple.l2_m
     l3 = l1 + l2 * c6
@@ -183,7 +183,7 @@ def pushed(
 
 
 def rest(grapple: Grapple, link: Push, load: Push) -> tuple[float, float]:
-    """Return (theta5, theta6) in rad at which the grapple hangs still under these forces."""
+    """Return (theta5, theta6) in rad of a grapple at rest under its weight and these forces."""
     theta5 = theta6 = 0.0
     g, of_link = grapple.g_m_s2, grapple.m1_kg * grapple.l1_m
     for _ in range(8):  # theta6 shortens what theta5 moves, by less each time
@@ -198,7 +198,7 @@ def rest(grapple: Grapple, link: Push, load: Push) -> tuple[float, float]:
 Accelerations = Callable[
     [Grapple, tuple[float, float, float, float], TipMotion], tuple[float, float]
 ]
-"""As `accelerations`: of grapple, sway and tip."""
+"""Function of grapple, sway and tip, as `accelerations`."""
 
 
 def advance(

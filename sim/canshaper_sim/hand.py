@@ -43,7 +43,7 @@ class Hand:
 
     Attributes:
         cycle_ms: greatest common divisor of all cycles; frames are due only at its multiples.
-        cycles_ms: cycle of each joystick message.
+        cycles_ms: cycle of each joystick message, in the order of the file.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -58,17 +58,17 @@ class Hand:
         self.cycle_ms = math.gcd(*(message.cycle_ms for message in self._messages))
 
     def due(self, time_ms: int, tick_ms: int) -> range:
-        """Return the times in ms, after the last tick up to time_ms, at which frames were due."""
+        """Return the times in ms, in the last tick_ms up to time_ms, at which frames may be due."""
         first_ms = (time_ms - tick_ms) // self.cycle_ms * self.cycle_ms + self.cycle_ms
         return range(max(0, first_ms), time_ms + 1, self.cycle_ms)
 
     def frames(self, time_ms: int, held: Held) -> list[Frame]:
-        """Return the frames that are due at this time in ms."""
+        """Return the frames that are due at this time in ms; none between two cycles."""
         return [one.frame(held) for one in self._messages if time_ms % one.cycle_ms == 0]
 
 
 class _Message:
-    """One message of the hand, with its protection."""
+    """One message that the hand sends, with alive counter and checksum where the file asks."""
 
     def __init__(self, bound: BoundInput) -> None:
         self.cycle_ms = bound.message.cycle_time or 20
@@ -91,7 +91,7 @@ class _Message:
 
 
 class _Joystick(_Message):
-    """One joystick message: the axes and switches of one joystick."""
+    """The message of one joystick: its axes, its switches, and those that enable joysticks."""
 
     def __init__(self, joystick: BoundJoystick, deployment: Deployment) -> None:
         super().__init__(joystick)
@@ -147,7 +147,7 @@ class _Joystick(_Message):
 
 
 class _Switches(_Message):
-    """Switches that enable joysticks: those to press follow ``enable``, the rest are always on."""
+    """Switches that enable joysticks: a joystick's first follows ``enable``, the rest are on."""
 
     def __init__(self, bound: BoundSwitches, deployment: Deployment) -> None:
         super().__init__(bound)

@@ -94,7 +94,7 @@ class JointParameters:
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """End stops of every joint in rad or m."""
+        """Joint -> (lower, upper) end stop, rad or m."""
         return {
             SLEW: (math.radians(self.slew_min_deg), math.radians(self.slew_max_deg)),
             LIFT_CYLINDER: (math.radians(self.lift_min_deg), math.radians(self.lift_max_deg)),
@@ -119,7 +119,8 @@ class JointBoom:
         """Stand still with the tip at start: theta1 in rad, radius and height in m.
 
         Raises:
-            DesignError: the joints do not reach the start within their ranges.
+            DesignError: a joint would be outside its range.
+            ValueError: the boom is too short or too long for the start.
         """
         p = parameters
         theta1, radius_m, height_m = start
@@ -153,13 +154,13 @@ class JointBoom:
 
     @property
     def joint_rates(self) -> tuple[float, float, float, float]:
-        """Rates of `joints`, in rad/s and m/s."""
+        """Rates of slew, lift and knuckle in rad/s, of the extension in m/s."""
         slew, lift, knuckle, extension = self.axes.values()
         return slew.speed, lift.speed, knuckle.speed, extension.speed
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius, height and their rates; rad, m, per second."""
+        """Slew angle, radius and height of the tip, then their rates; rad, m, per second."""
         slew = self.axes[SLEW]
         return (
             slew.position,
@@ -223,7 +224,7 @@ class JointBoom:
         )
 
     def _at_middle(self) -> tuple[float, float, float, float]:
-        """Return radius, its rate, height and its rate in the middle of the last step."""
+        """Return radius, its rate, height, its rate in the middle of the last step; m and m/s."""
         _, lift, knuckle, extension = self.axes.values()
         middle = (lift.middle_position, knuckle.middle_position, extension.middle_position)
         rates = (lift.middle_speed, knuckle.middle_speed, extension.middle_speed)
@@ -239,7 +240,7 @@ def _dot(row: Iterable[float], column: Iterable[float]) -> float:
 def _stages(
     step_s: float, way: float, speed: float, end_speed: float, end_acceleration: float
 ) -> tuple[float, float]:
-    """Return the (start, middle) acceleration that gives the step this way and change of speed."""
+    """Return start and middle acceleration of a step that covers `way` and ends at `end_speed`."""
     travel = 6.0 * (way / step_s - speed) / step_s
     change = 6.0 * (end_speed - speed) / step_s
     middle = 0.5 * (change - end_acceleration - travel)

@@ -22,8 +22,8 @@ class JoystickNode:
         bypass: the operator has switched anti-sway off.
 
     Raises:
-        DesignError: the script was made for joints and the crane is driven by its tip, or the
-            other way round. Axes that a crane merely lacks are left out.
+        DesignError: the script moves a boom joint that the crane lacks, or any axis that a crane
+            with boom joints lacks. Other axes that the crane lacks are left out.
     """
 
     def __init__(self, deployment: Deployment, script: Script, *, bypass: bool = False) -> None:
@@ -40,7 +40,7 @@ class JoystickNode:
         self._held = Held()
 
     def frames(self, time_ms: int) -> list[Frame]:
-        """Return the frames that are due at this time of the script, in ms."""
+        """Return the frames that are due at this time of the script in ms; none between cycles."""
         if time_ms % self.cycle_ms:
             return []
         joysticks = {axis: self.script.command(axis, time_ms / 1000.0) for axis in self._axes}
@@ -49,5 +49,5 @@ class JoystickNode:
         return self._hand.frames(time_ms, self._held)
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
-        """Return the frames since the last tick, in order; the newest of each joystick counts."""
+        """Return every frame due in the last tick_ms up to time_ms, the oldest first."""
         return [frame for ms in self._hand.due(time_ms, tick_ms) for frame in self.frames(ms)]

@@ -55,7 +55,7 @@ class Boom(NamedTuple):
         )
 
     def jacobian(self, lift_rad: float, knuckle_rad: float, extension_m: float) -> Jacobian:
-        """Return the derivatives of `tip` by lift, knuckle and extension."""
+        """Return the derivatives of the tip's radius and height by lift, knuckle and extension."""
         outer = lift_rad + knuckle_rad
         s, c = math.sin(outer), math.cos(outer)
         d4 = self.outer_boom_m + extension_m
@@ -96,7 +96,7 @@ class Boom(NamedTuple):
         )
 
     def angles(self, radius_m: float, height_m: float, extension_m: float) -> tuple[float, float]:
-        """Return (lift, knuckle) in rad, knuckle up, that put the tip there with this extension.
+        """Return (lift, knuckle) in rad that put the tip there; of two ways the one bent upwards.
 
         Raises:
             ValueError: the tip cannot reach this place.

@@ -1,7 +1,8 @@
 """A log that the grapple grips during a drive, and the second swing of a long log.
 
 Grapple and log are one body on one pendulum. A long log adds a second, linear swing, the same in
-both planes. The angle of the tool shows both; ``share`` is the part of the second one:
+both planes. The tool's angle is 1 - ``share`` of the pendulum's angle plus the second swing, which
+goes about ``share`` of the angle that the tip's acceleration and the wind lean a plumb line by.
 """
 
 import math
@@ -42,7 +43,7 @@ class LogParameters:
         check_ranges("log", self, _ALLOWED)
 
     def gripped(self, time_s: float) -> bool:
-        """Return whether the log is in the grapple at that time."""
+        """Return whether the grapple has gripped the log by that time."""
         return time_s >= self.grip_s
 
     def loaded(self, grapple: Grapple) -> Grapple:
@@ -74,7 +75,7 @@ class SecondSwing:
     def advance(
         self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion], push: Push
     ) -> None:
-        """Swing for step_s seconds under this push and the tip's mean acceleration."""
+        """Swing for step_s seconds under this push on the log and the tip's mean acceleration."""
         if step_s != self._step_s:
             self._step_s, self._by = step_s, swing_over(self._omega, self._ratio, step_s)
         start, middle, end = (_pulls(tip) for tip in tips)

@@ -18,7 +18,7 @@ from canshaper_sim.valve import ValveParameters
 _ALLOWED = {
     "slew_full_speed_rad_s": (0.01, 1.0),
     "boom_m": (2.0, 40.0),
-    "start_luff_deg": (-20.0, 85.0),
+    "start_luff_deg": (-20.0, 80.0),
 }
 
 

@@ -1,6 +1,6 @@
 """The machines a plant can be: the axes of their valves, and how the valves move the crane.
 
-- ``tip``: one valve for each tip coordinate; the tip follows its commands exactly.
+- ``tip``: one valve for each tip coordinate; no joints: the tip follows its valves exactly.
 - ``tip-controller``: tip commands go to the machine's tip controller, which drives the joints.
 - ``joints``: one valve for each joint; the operator drives the joints.
 - ``overhead``: bridge, trolley and hoist, one drive each; the load hangs from a rope.
@@ -56,7 +56,10 @@ class Machine(Protocol):
         """Crane and grapple."""
 
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
-        """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds."""
+        """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.
+
+        An axis that is not in `commands` keeps its last command.
+        """
 
 
 class ValveDrivenCrane:
@@ -91,7 +94,7 @@ class TipControlledCrane:
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
         """Hold the tip commands for dt_s seconds; the tip controller ticks at its own period.
 
-        An axis that is not in `commands` keeps its last command.
+        An axis not in `commands` keeps its last command. ``rotator`` bypasses the controller.
         Raises DesignError for an unknown axis, ValueError for dt_s <= 0 or a command not finite.
         """
         if not 0.0 < dt_s < math.inf:

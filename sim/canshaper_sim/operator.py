@@ -33,7 +33,7 @@ def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXE
 
     Ramps last 0.1 .. 0.4 s, plateaus 0.4 .. 2.5 s. The same arguments always give the same script.
     Strokes that would carry the boom far away from the start pose of the default crane are reversed
-    or cut short. The last second is neutral.
+    or cut short. The last second is neutral. Raises DesignError for an unknown axis.
     """
     strokes: list[Stroke] = []
     reach = reach_s(axes)
@@ -85,7 +85,7 @@ _PAUSE_SHARE = 0.33
 
 
 def reach_s(axes: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return, by axis, how far the strokes of such a crane may add up in s of full speed."""
+    """Return axis -> (lowest, highest) sum of random strokes, s of full speed, with such axes."""
     return REACH_S | _REACH_OF.get(kind_of(axes), {})
 
 
@@ -121,8 +121,8 @@ def _random_strokes(
 def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     """Return a built-in script, or `random-<seed>` of 30 s on these axes.
 
-    On the joints of a boom, `demo` and `loading` are the same work joint by joint; on the axes of a
-    crane with a rope, `demo` is the one for that crane.
+    `axes` are coordinates. On the joints of a boom, `demo` and `loading` are the same work joint by
+    joint; on the axes of a crane with a rope, `demo` is the one for that crane.
 
     Raises:
         DesignError: there is no script of that name; the message lists the names.
@@ -140,7 +140,8 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
 def script_for(deployment: Deployment, name: str) -> Script:
     """Return a script by its name, for the axes of a deployment.
 
-    ``pulse-NAME`` may also give the deployment's own name of an axis.
+    ``pulse-NAME`` may also give the deployment's own name of an axis. For a file with a section
+    ``crane`` the strokes have the deployment's names, and those of absent axes are dropped.
 
     Raises:
         DesignError: there is no script of that name, or it moves no axis of this crane.

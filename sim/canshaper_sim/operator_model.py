@@ -52,7 +52,7 @@ class Skill:
 
 @dataclass(frozen=True, slots=True)
 class Operators:
-    """Three persons at work. A novice has to choose where the others know: .38 s (Laming 1968)."""
+    """Three persons at work. A novice reacts late, as one who chooses: .38 s (Laming 1968)."""
 
     catching: Skill = Skill()
     waiting: Skill = Skill(catch=0.0)
@@ -60,7 +60,7 @@ class Operators:
 
 
 class Known(NamedTuple):
-    """Knowledge of one axis, learned by practice."""
+    """What a person has learned of one axis: its speed, its run-on, the swing of its load."""
 
     full_m_s: float  # speed of the tip at full deflection
     # Of that speed, tick by tick, after the joystick is let go at once: so much of what the hand
@@ -107,7 +107,10 @@ class OperatorModel:
         self.joysticks, self.taps = [0.0] * len(task), 0
 
     def see(self, time_s: float, seen: Sequence[tuple[float, float]]) -> None:
-        """See each axis' (place of the tip, offset of the load), m; move the hand for one tick."""
+        """See each axis' (place of the tip, offset of the load), m; move the hand for one tick.
+
+        The hand rests until the first reaction time is over.
+        """
         self._seen.append(seen)
         if len(self._seen) <= self._late:
             return
@@ -161,7 +164,7 @@ class _Axis:
         self.error_m = self._target_m - place_m - self._coming_m
 
     def let_go(self, time_s: float) -> bool:
-        """Release the joystick where a stroke or tap ends; return whether a new tap may begin."""
+        """Release the joystick where a stroke or tap ends; return whether a tap may begin now."""
         if not self.wanted:
             return time_s >= self._ready_s
         hand_s = 0.5 * self._joystick * abs(self._joystick) * self._skill.ramp_s
@@ -173,13 +176,16 @@ class _Axis:
         return False
 
     def worth_m(self, within_m: float) -> float:
-        """Return the way of a correction, m; 0 for an error below what the person can trust."""
+        """Return the way in m of a correction; 0 if the error, by this tolerance, is too small."""
         worth_m = max(self._skill.dead_m, _WORTH_A_TAP * within_m)
         worth_m += self._skill.run_on * abs(self._coming_m)
         return self.error_m if abs(self.error_m) > worth_m else 0.0
 
     def caught_m(self, time_s: float, part: float) -> float:
-        """Return the way, m, of a tap due now, to be half done when the load turns; else 0."""
+        """Return the way in m of a tap that is half done when the load turns; 0 if not due now.
+
+        It takes half of the remaining error and half of this part of the swing.
+        """
         omega = self.known.omega_rad_s
         phase = math.atan2(-self._rate_m_s / omega, self._off_m)  # the swing turns at each pi
         for turn in range(math.ceil(phase / math.pi), math.ceil(phase / math.pi) + 3):
@@ -191,7 +197,7 @@ class _Axis:
         return 0.0
 
     def _shape(self, way_m: float) -> tuple[float, float]:
-        """Return the duration of a tap in s, and its deflection."""
+        """Return the duration of a tap in s, and its deflection, -1 .. 1."""
         level = abs(way_m) / (self.known.full_m_s * _TAP_S)
         level = min(1.0, max(_LEAST_LEVEL, level))
         return abs(way_m) / (self.known.full_m_s * level), math.copysign(level, way_m)

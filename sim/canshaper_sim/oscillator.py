@@ -7,7 +7,10 @@ State = tuple[float, float]
 
 
 def swing_over(omega: float, ratio: float, step_s: float) -> tuple[float, float, float, float]:
-    """Return the transition matrix of (deflection, rate), row by row; omega in rad/s undamped."""
+    """Return the transition matrix of (deflection, rate) over a step, row by row.
+
+    omega is the undamped frequency in rad/s, ratio the damping ratio below 1.
+    """
     damped = omega * math.sqrt(1.0 - ratio**2)
     fade = math.exp(-ratio * omega * step_s)
     cosine = fade * math.cos(damped * step_s)
@@ -17,6 +20,6 @@ def swing_over(omega: float, ratio: float, step_s: float) -> tuple[float, float,
 
 
 def moved(by: tuple[float, float, float, float], state: State, about: float) -> State:
-    """Return the state after a step with transition matrix `by`, for a swing about this place."""
+    """Return the state after a step of `swing_over`, for a swing about the place `about`."""
     off = state[0] - about
     return about + by[0] * off + by[1] * state[1], by[2] * off + by[3] * state[1]

@@ -4,7 +4,7 @@ The load is a point at r below the trolley, at the length of the rope: |r| = l(t
 the rope per kg of load and m of rope, k, keeps this distance:
 
     r'' = -a - g e_z - k r - c (r' - (l'/l) r)      a: acceleration of the trolley
-    k = (r . (-a - g e_z) + |r'|^2 - l'^2 - l l'') / l^2
+    k = (r . (-a - g e_z) + |r'|^2 - l'^2 - l l'') / l^2        c = 2 damping_ratio sqrt(g / l)
 
 (r . r = l^2, differentiated twice; Goldstein, Classical Mechanics, 1.4). No small angle is assumed,
 and the terms of a rope that changes its length, such as 2 l' theta', are included. The rope never
@@ -43,7 +43,7 @@ _ROPE = {
 
 
 def drive() -> ValveParameters:
-    """Return an electric drive: its inverter follows every command within its ramp."""
+    """Return an electric drive: no deadband, full speed within 0.2 s, a lag of 0.1 s."""
     return ValveParameters(deadband=0.0, rate_limit_1_s=5.0, lag_s=0.1)
 
 
@@ -61,7 +61,7 @@ class RopeParameters:
     g_m_s2: float = 9.81
 
     def check(self, owner: str, allowed: Mapping[str, tuple[float, float]]) -> None:
-        """Raise DesignError for values that describe no crane; see ``check_ranges``."""
+        """Raise DesignError for a value outside its range; `allowed` adds to those of the rope."""
         start = {"rope_m": (self.rope_min_m, self.rope_max_m)}
         check_ranges(owner, self, {**allowed, **_ROPE, **start})
 
@@ -87,7 +87,7 @@ class OverheadParameters(RopeParameters):
         self.check("overhead", _ALLOWED)
 
     def boom(self, ends: EndParameters) -> "OverheadBoom":
-        """Return trolley and rope in the start pose."""
+        """Return bridge, trolley and rope in the start pose."""
         runway, span = 0.5 * self.runway_m, 0.5 * self.span_m
         return OverheadBoom(
             {
@@ -116,7 +116,7 @@ class OverheadBoom:
         load: load relative to the trolley: along the runway, along the bridge, upwards, m. With a
             sling this is the hook.
         rate: velocity of ``load``, m/s.
-        slung: the load on the sling; None without a sling.
+        slung: the load on the sling; None without a sling, and before ``swing``.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class OverheadBoom:
         self.slung: SlungLoad | None = None
 
     def swing(self, sway: "Sway") -> None:
-        """Let the load hang at these angles: theta5 along the runway, theta6 along the bridge."""
+        """Hang the load at theta5 along the runway, theta6 along the bridge; rates are ignored."""
         along, across = math.tan(sway.theta5_rad), math.tan(sway.theta6_rad)
         down = self.rope_m / math.sqrt(1.0 + along * along + across * across)
         self.load = (down * along, down * across, -down)
@@ -180,7 +180,10 @@ class OverheadBoom:
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """Polar coordinates of the trolley about the start, height of the hook, and their rates."""
+        """Angle and distance of the trolley from its start, minus the rope's length, then rates.
+
+        In rad and m, per second; at the start itself the rates of angle and distance are 0.
+        """
         bridge, trolley, hoist = self.axes.values()
         x, y, vx, vy = bridge.position, trolley.position, bridge.speed, trolley.speed
         radius = math.hypot(x, y)
@@ -189,7 +192,7 @@ class OverheadBoom:
         return math.atan2(y, x), radius, hoist.position, turn, out, hoist.speed
 
     def advance(self, step_s: float) -> None:
-        """Move on by step_s seconds."""
+        """Move bridge, trolley, rope and load on by step_s seconds."""
         if not (slung := self.slung):
             self._move(step_s)
             return
@@ -254,7 +257,7 @@ class OverheadBoom:
             r: load relative to the trolley, m.
             v: velocity of r, m/s.
             trolley: acceleration of the trolley, m/s^2.
-            hoist: position (m), speed (m/s) and acceleration (m/s^2) of the hook.
+            hoist: minus the length of the rope (m), then speed (m/s), acceleration (m/s^2).
         """
         length, change, change_2 = (-one for one in hoist)
         pull = (-trolley[0], -trolley[1], -trolley[2] - self._p.g_m_s2)

@@ -14,7 +14,7 @@ P = TypeVar("P")
 
 
 def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float]:
-    """Return every parameter by its dotted name, such as ``grapple.l2_m``, with its value."""
+    """Return dotted name (grapple.l2_m) -> value of every parameter, by default the nominal."""
     values: dict[str, float] = {}
     owner = CraneParameters() if parameters is None else parameters
     for field in dataclasses.fields(owner):
@@ -29,7 +29,7 @@ def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float
 def changed_parameters(
     changes: list[str], deployment: "Deployment | None" = None
 ) -> CraneParameters:
-    """Return the nominal crane changed by the file, then by these NAME=VALUE changes."""
+    """Return the nominal crane changed by ``crane.simulated`` of the file, then by NAME=VALUE."""
     crane = CraneParameters()
     if deployment and (section := deployment.config.crane):
         own = [f"{name}={value}" for name, value in section.simulated.items()]
@@ -62,7 +62,7 @@ def changed(parameters: P, changes: list[str], option: str) -> P:
 
 
 def _replaced(owner: P, values: Mapping[str, float]) -> P:
-    """Return a copy of a parameter object with these values, by dotted name, changed at once."""
+    """Return a copy of a parameter object with these values (by dotted name) set at once."""
     changes: dict[str, Any] = {name: one for name, one in values.items() if "." not in name}
     for group in {name.partition(".")[0] for name in values if "." in name}:
         inner = {n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{group}.")}

@@ -68,7 +68,7 @@ VALVE_ADDRESS = 0x80
 
 
 class _ValveInput:
-    """Commands for one valve, and the age of the last one.
+    """Commands for one valve, and the age in s of the last one.
 
     A frame with wrong protection is ignored: the valve closes when no correct frame comes in time.
     """
@@ -128,7 +128,7 @@ class _Measurement:
         self._left_s = first_s
 
     def frames(self, crane: Crane, passed_s: float) -> Iterator[Frame]:
-        """Yield the frame if it is due once passed_s more seconds have passed."""
+        """Let passed_s seconds pass; yield the frame, once, if it is due."""
         self._left_s -= passed_s
         if self._left_s <= 1e-9:
             self._left_s += self._cycle_s
@@ -142,7 +142,7 @@ def cycle_s(bound: BoundValue[Any]) -> float:
 
 
 def _measurements(deployment: Deployment, sent: Mapping[str, Sender]) -> Iterator[_Measurement]:
-    """Yield the read messages that no feedback message covers: valves, load and rope."""
+    """Yield the numbers that the deployment reads and `sent` lacks: valves, load and rope."""
     for axis, bound in deployment.axes.items():
         if valve := bound.feedback:
             moves = deployment.coordinates.get(axis, axis)
@@ -176,17 +176,18 @@ class PlantNode:
 
     Args:
         deployment: names the valve messages; its axes choose the machine where ``machine`` is None.
-        parameters: the crane; by default the nominal one.
+        parameters: the crane; by default the nominal one with ``crane.simulated`` of the file.
         machine: one of `machines.MACHINES`.
         sway: swing of the grapple at the start; by default it hangs still.
-        unit: an FMU in place of our crane.
+        unit: an FMU in place of our crane; machine and sway do not count then.
         listeners: nodes other than the controller listen; without them pose, speeds and sway are
             sent only if the controller receives them.
 
     Raises:
         ConfigError: the machine lacks an axis of the deployment, or the DBC files lack a feedback
             message.
-        ValueError: no such machine, or the joints do not reach the start pose.
+        DesignError: no such machine, a joint starts out of its range, or the unit does not fit.
+        ValueError: the joints do not reach the start pose.
     """
 
     def __init__(
@@ -262,7 +263,7 @@ class PlantNode:
             self._canopen.receive(frame)
 
     def advance(self, dt_s: float) -> None:
-        """Let dt_s seconds pass; each valve holds its last command until its timeout."""
+        """Let dt_s seconds pass; a valve holds its last command until its timeout, then 0."""
         self._passed_s += dt_s
         commands, canopen = {}, self._canopen
         for valve in self._inputs.values():
@@ -274,7 +275,7 @@ class PlantNode:
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:
-        """Return the due frames of valves, pose, speeds, sway, load and CANopen nodes."""
+        """Return pose, speeds and sway, and the due frames of valves, load, sensors and nodes."""
         state = self.crane.state
         frames = self._measured(state) if self._feedback else []
         for one in self._measurements:
@@ -298,7 +299,7 @@ class PlantNode:
         return frames
 
     def _values(self, name: str, state: CraneState) -> tuple[float, ...]:
-        """Return the values of the signals of a feedback message, in its order."""
+        """Return the values of a feedback message, in its order: deg, m; speeds in rad/s, m/s."""
         if name == "TipPosition":
             return _heading_deg(state.theta1_rad), state.radius_m, state.height_m
         if name == "TipVelocity":

@@ -64,7 +64,7 @@ class Pump:
         self._delivered = 0.0
 
     def advance(self, step_s: float) -> None:
-        """Share the oil of the next step among the valves by the present demand of their spools."""
+        """Set each valve's ``supply`` for the next step by what all spools demand at present."""
         p, valves = self._parameters, self._by_load
         asked = [abs(valve.spool * valve.ease) for valve in valves]
         total = sum(asked)

@@ -17,7 +17,7 @@ PLANT_STEP_MS = 10
 
 
 class StopFlag:
-    """A flag that is set once SIGTERM or SIGINT came."""
+    """A flag that SIGTERM or SIGINT sets; it takes over both signals of the process."""
 
     def __init__(self) -> None:
         self.set = False
@@ -50,7 +50,7 @@ def open_ports(deployment: Deployment) -> dict[str, Port]:
 def run_plant(
     deployment: Deployment, parameters: CraneParameters, machine: str | None = None
 ) -> None:
-    """Simulate the crane until SIGTERM or SIGINT: read valve frames, send feedback every 20 ms."""
+    """Simulate the crane until SIGTERM or SIGINT: valve frames in, feedback out every 20 ms."""
     node = PlantNode(deployment, parameters, machine)
     ports = open_ports(deployment)
     stop = StopFlag()
@@ -76,7 +76,7 @@ def run_plant(
 
 
 def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> bool:
-    """Play a script once on the joysticks, then let go; return False if a signal stopped it."""
+    """Play a script once, then send no more; return False if SIGTERM or SIGINT stopped it."""
     node = JoystickNode(deployment, script, bypass=bypass)
     ports = open_ports(deployment)
     stop = StopFlag()

@@ -31,14 +31,22 @@ _ACROSS_ALONG = tuple(dict.fromkeys(_SWAY_OF_GRAPPLE.values()))
 def dwell_s(deployment: Deployment) -> float:
     """Return the time in s after a release from which sway counts as residual.
 
-    This time is the longest tail of the axes if it exceeds twice the default, else the default.
+    It is the longest ``tail_s`` of the axes if that exceeds 5 s, else 2.5 s.
     """
     longest = max(axis.config.limits.tail_s for axis in deployment.axes.values())
     return longest if longest > 2.0 * DWELL_S else DWELL_S
 
 
 class Recorder:
-    """Takes every frame; keeps one row for each sway frame, from the first joystick frame on."""
+    """Takes every frame; keeps one row for each sway frame, from the first joystick frame on.
+
+    Args:
+        parameters: the crane's full speeds and lengths; by default those of the file.
+
+    Attributes:
+        missed_deadlines: as the last status message said.
+        seen: names of the messages that came.
+    """
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
         crane = parameters or changed_parameters([], deployment)
@@ -86,7 +94,7 @@ class Recorder:
                     self._handlers[key] = name, message.length, handler
 
     def receive(self, frame: Frame, time_s: float) -> None:
-        """Take a frame seen at time_s; times have any origin and increase."""
+        """Take a frame seen at time_s (any origin, increasing); ignore one that is not recorded."""
         entry = self._handlers.get(frame[:3])
         if entry is None and frame.extended:  # a J1939 frame from any address
             entry = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
@@ -242,6 +250,6 @@ class Recorder:
 
 
 def _from_above(heading: float, out_m: float, across_m: float) -> Point:
-    """Return (x, y) about the pillar, m, of a point so far along the boom and in slew direction."""
+    """Return (x, y) about the pillar, m, of a point given from a boom at `heading`, rad."""
     cosine, sine = math.cos(heading), math.sin(heading)
     return out_m * cosine - across_m * sine, out_m * sine + across_m * cosine

@@ -14,7 +14,7 @@ class AxisTrace:
     Attributes:
         joystick: demand of the operator, [-1, 1] of full speed.
         sent: velocity setpoint in the valve frame (deadband compensation undone), [-1, 1].
-        speed: speed of the tip in this axis as a fraction of the axis' full speed.
+        speed: speed of what the axis moves (tip, joint, trolley), fraction of its full speed.
         sway_deg: swing of the grapple in the plane of this axis (slew: theta5, near-far: theta6),
             degrees; None for an axis that excites no swing (lift).
     """
@@ -30,10 +30,11 @@ class CraneTrace:
     """Tip and grapple over a drive; every non-empty list is as long as the recording's ``t_s``.
 
     Attributes:
-        tip_m: tip of the boom from above, m; x points along the boom that has not slewed. Empty
-            if no sensor measures it.
+        tip_m: tip of the boom from above, m; x points along the boom that has not slewed. Of an
+            overhead crane the trolley, x along the runway. Empty if no sensor measures it.
         grapple_m: grapple from above, m; empty if no sensor measures it.
-        sway_deg: total swing of both planes, as the root of the sum of squares, degrees.
+        sway_deg: root of the sum of squares of both planes' swing, of an overhead crane the angle
+            from the vertical; degrees.
     """
 
     tip_m: list[Point]

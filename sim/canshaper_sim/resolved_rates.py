@@ -32,14 +32,14 @@ _PLAY = 1e-6
 
 
 class Bounds(NamedTuple):
-    """Lowest (<= 0) and highest (>= 0) rate of every joint, fractions of full speed."""
+    """Lowest (<= 0) and highest (>= 0) rate of lift, knuckle, extension; part of full speed."""
 
     low: Vector
     high: Vector
 
 
 class ResolvedRates:
-    """Solver of the joint rates in one pose, for any number of tip velocities."""
+    """Joint rates in one pose; ``free`` is n, the motion that keeps the tip still, or zeros."""
 
     __slots__ = ("_height", "_inverse", "_radius", "free")
 
@@ -71,7 +71,7 @@ class ResolvedRates:
             self.free = (cross[0] * f, cross[1] * f, cross[2] * f)
 
     def least_squares(self, radius_speed: float, height_speed: float) -> Vector:
-        """Return the damped least-squares rates p for a tip velocity in m/s."""
+        """Return the damped least-squares rates p, unbounded, for a tip velocity in m/s."""
         a, b, c = self._inverse
         y_r = a * radius_speed + b * height_speed
         y_z = b * radius_speed + c * height_speed
@@ -83,7 +83,7 @@ class ResolvedRates:
         )
 
     def within(self, rates: Vector, bounds: Bounds, preferred: float = 0.0) -> tuple[float, Vector]:
-        """Put rates within the bounds.
+        """Return rates that move the tip in the same direction, within the bounds.
 
         Args:
             rates: least-squares rates p.
@@ -116,7 +116,10 @@ class ResolvedRates:
     def _lines(
         self, rates: Vector, bounds: Bounds
     ) -> tuple[list[tuple[float, float]], list[tuple[float, float]], float]:
-        """Return bounds on t as (at, by): at - s by; and the s of joints that n does not move."""
+        """Return lower bounds of t, upper bounds of t, and an upper bound of s.
+
+        A bound of t is (at, by) for at - s by. Joints that n does not move bound s, and so does 1.
+        """
         floors: list[tuple[float, float]] = []
         ceilings: list[tuple[float, float]] = []
         scale = 1.0
@@ -136,7 +139,7 @@ class ResolvedRates:
 
 
 def less(bounds: Bounds, used: Sequence[float]) -> Bounds:
-    """Return the bounds that remain once the rates `used` are taken."""
+    """Return the bounds that the rates `used` leave, with 0 within them."""
     low, high = bounds
     return Bounds(
         (min(0.0, low[0] - used[0]), min(0.0, low[1] - used[1]), min(0.0, low[2] - used[2])),

@@ -8,6 +8,8 @@ planes. By Lagrange for the rigid body, at small angles:
 
     M q'' + J n (n . q'') = M q''(of a point mass) - m e ((g + z'') n + l n'')
 
+M: inertia about each joint, l: from there to the grapple, m: mass of the log, z: height of the tip.
+
 The rotator holds the log in place and draws no oil from the pump. It turns 6 to 12 times a minute.
 """
 
@@ -37,7 +39,7 @@ class RotatorParameters:
 
 
 class Rotator:
-    """The rotator in motion, at first without a log.
+    """The rotator in motion, at first without a log; ``axis`` is its angle from boom to log, rad.
 
     Args:
         parameters: valve, full speed and start angle of the rotator.

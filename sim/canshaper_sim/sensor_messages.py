@@ -1,13 +1,13 @@
 """Frames of the sway sensors that a deployment reads."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from canshaper.codec.frame import Frame, MessageKey
 from canshaper.codec.message import SentMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import BoundSwaySensor
-from canshaper_sim.axes import SLEW
+from canshaper_sim.axes import BRIDGE, SLEW
 from canshaper_sim.crane import CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.sway_sensor import SwaySensor, SwaySensorParameters
@@ -18,6 +18,7 @@ class SensorMessage:
 
     Args:
         axes: axis -> the sway sensor of the deployment that is read from this message.
+        across: axes whose load swings by theta5: those that slew, or move the bridge.
         parameters: errors of the sensors.
 
     Attributes:
@@ -25,7 +26,10 @@ class SensorMessage:
     """
 
     def __init__(
-        self, axes: Mapping[str, BoundSwaySensor], parameters: SwaySensorParameters
+        self,
+        axes: Mapping[str, BoundSwaySensor],
+        across: Collection[str],
+        parameters: SwaySensorParameters,
     ) -> None:
         first = next(iter(axes.values()))
         message, self.node = first.message, first.config.node
@@ -41,7 +45,7 @@ class SensorMessage:
                 SwaySensor(
                     parameters,
                     name,
-                    across=name == SLEW,
+                    across=name in across,
                     kind=bound.config.kind,
                 ),
             )
@@ -49,7 +53,7 @@ class SensorMessage:
         }
 
     def frames(self, state: CraneState, passed_s: float) -> Iterator[Frame]:
-        """Yield the frame if it is due once passed_s more seconds have passed."""
+        """Take the state passed_s after the last; yield the frame if due, none from lost_s on."""
         time_s = state.time_s
         sway = Sway(
             state.theta5_rad, state.theta6_rad, state.theta5_rate_rad_s, state.theta6_rate_rad_s
@@ -72,9 +76,11 @@ class SensorMessage:
 def sensor_messages(
     deployment: Deployment, parameters: SwaySensorParameters
 ) -> list[SensorMessage]:
-    """Return every message with sway that the deployment reads."""
+    """Return every message with sway that the deployment reads, each with all its sensors."""
     messages: dict[MessageKey, dict[str, BoundSwaySensor]] = {}
     for name, axis in deployment.axes.items():
         if bound := axis.sway_sensor:
             messages.setdefault(bound.message.key, {})[name] = bound
-    return [SensorMessage(axes, parameters) for axes in messages.values()]
+    moves = deployment.coordinates
+    across = {name for name in deployment.axes if moves.get(name, name) in (SLEW, BRIDGE)}
+    return [SensorMessage(axes, across, parameters) for axes in messages.values()]

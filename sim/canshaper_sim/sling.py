@@ -27,7 +27,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class SlingParameters:
-    """A sling from the hook to the load."""
+    """A sling from the hook to the load, and the ground on which the load may stand."""
 
     length_m: float = 0.0  # 0: they swing as one
     load_ratio: float = 1.0  # mass of the load, masses of the hook
@@ -45,7 +45,8 @@ class SlungLoad:
         parameters: the sling.
         damping_ratio: damping ratio of a swing about the hook.
         g_m_s2: gravity.
-        hook: position of the hook relative to the trolley, m; the load hangs in line with the rope.
+        hook: position of the hook relative to the trolley, m; the load hangs in line with the rope,
+            but for ``off_m`` and the ground.
 
     Attributes:
         position: along the runway, along the bridge, upwards, from where the trolley began, m.
@@ -85,7 +86,7 @@ class SlungLoad:
         return plus((0.0, 0.0, 0.0), -part_s * self._p.load_ratio, held)
 
     def _held(self, up: Vector, hook_rate: Vector) -> Vector:
-        """Return the pull of the sling at the load, m/s^2; zeros while the sling is slack."""
+        """Return the sling's pull at the load, m/s^2, zeros if slack; `up` leads to the hook, m."""
         apart = math.sqrt(dot(up, up))
         stretch = apart - self._p.length_m
         if stretch <= 0.0:

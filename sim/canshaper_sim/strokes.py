@@ -29,7 +29,11 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """One movement of one joystick axis from neutral to `level` (-1 .. 1) and back."""
+    """One movement of one joystick axis from neutral to `level` (-1 .. 1) and back.
+
+    Raises:
+        DesignError: a number outside its range, or a duration shorter than the ramp.
+    """
 
     axis: str  # name in the deployment
     start_s: float
@@ -52,7 +56,7 @@ class Stroke:
         return self.start_s + self.duration_s + self.ramp_s
 
     def command(self, time_s: float) -> float:
-        """Return the joystick value of this stroke alone, -1 .. 1."""
+        """Return the joystick value of this stroke alone, -1 .. 1; 0 before and after it."""
         since_press = time_s - self.start_s
         if since_press < 0.0:
             return 0.0
@@ -68,7 +72,11 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """Strokes of the operator in duration_s seconds; the joystick is neutral between strokes."""
+    """Strokes of the operator in duration_s seconds; the joystick is neutral between strokes.
+
+    Raises:
+        DesignError: a stroke ends later.
+    """
 
     name: str
     strokes: tuple[Stroke, ...]
@@ -108,11 +116,11 @@ class Script:
         return Script(self.name, moved, self.duration_s)
 
     def of_axis(self, axis: str) -> tuple[tuple[float, float, Stroke], ...]:
-        """Return (start, end, stroke), times in s, of each stroke of an axis, in order of time."""
+        """Return (start, end + 1 us, stroke), times in s, of an axis' strokes in order of start."""
         return self._by_axis.get(axis, ())
 
     def command(self, axis: str, time_s: float) -> float:
-        """Return the joystick value of an axis, -1 .. 1; 0 for an axis without strokes."""
+        """Return the sum of the axis' strokes, cut to -1 .. 1; 0 for an axis without strokes."""
         strokes = self._by_axis.get(axis)
         if strokes is None:
             return 0.0

@@ -20,24 +20,24 @@ class Surroundings:
 
     @property
     def none(self) -> bool:
-        """True if the grapple hangs free from a crane on level ground."""
+        """True if there are none: the grapple hangs free from a crane on level ground."""
         return not (self.contact or self.carrier or self.wind or self.rotator)
 
     def settle(self, grapple: Grapple, tip: TipMotion) -> None:
-        """Let the carrier lean under the grapple at rest."""
+        """Let the carrier, if there is one, lean under the grapple at rest."""
         for _ in range(4):  # each leans on the other, by less every time
             if self.carrier:
                 sway = Sway(*self.rest(grapple, tip.slew_rad, tip.radius_m))
                 self.carrier.settle(grapple, sway, tip)
 
     def rest(self, grapple: Grapple, slew_rad: float, radius_m: float) -> tuple[float, float]:
-        """Return (theta5, theta6) in rad at which the grapple hangs still in the present wind."""
+        """Return (theta5, theta6) in rad at rest in this wind, on this carrier, without ground."""
         theta5, theta6 = rest(grapple, *self.pushes(grapple, slew_rad, radius_m))
         askew = self.rotator.lean(grapple) if self.rotator else (0.0, 0.0)
         return theta5 + askew[0], theta6 + askew[1]
 
     def advance(self, step_s: float, grapple: Grapple, sway: Sway, tip: TipMotion) -> None:
-        """Let step_s seconds pass."""
+        """Move wind, rotator and carrier on by step_s seconds."""
         if self.wind:
             self.wind.advance(step_s)
         if self.rotator:
@@ -48,7 +48,7 @@ class Surroundings:
     def accelerations(
         self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
     ) -> tuple[float, float]:
-        """Return (theta5'', theta6'') with all surroundings, rad/s^2; see `accelerations`."""
+        """Return (theta5'', theta6'') of this sway with all surroundings, rad/s^2."""
         across, along = accelerations(grapple, sway, tip)
         if self.contact:
             held = self.contact.accelerations(grapple, sway, tip)
@@ -61,7 +61,7 @@ class Surroundings:
         return across, along
 
     def pushes(self, grapple: Grapple, slew_rad: float, radius_m: float) -> tuple[Push, Push]:
-        """Return the forces on link and grapple besides the gravity of level ground, N/kg."""
+        """Return the forces of slope, rocking and wind on link and on grapple, N/kg."""
         link = self.carrier.push(slew_rad, radius_m) if self.carrier else (0.0, 0.0, 0.0)
         if self.wind is None:
             return link, link

@@ -60,8 +60,8 @@ class SwaySensor:
     Args:
         parameters: errors of the sensor.
         name: name of the sensor, which seeds its noise.
-        across: the sensor measures across the boom (theta5), else along it (theta6).
-        kind: the measured quantity.
+        across: the sensor measures across the boom or along the runway (theta5), else theta6.
+        kind: the measured quantity: angle, rate, or inclination against the vertical.
     """
 
     def __init__(
@@ -96,14 +96,14 @@ class SwaySensor:
             past.popleft()
 
     def _fused(self, angle: float, passed_s: float) -> float:
-        """Return a gyro's angle corrected by accelerations, which show 0 on a free pendulum."""
+        """Return a gyro's angle, rad, drawn to the 0 that accelerations show on a free pendulum."""
         fusion_s = self._parameters.fusion_s
         share = -math.expm1(-passed_s / fusion_s) if fusion_s else 1.0
         self._hidden += share * (angle - self._hidden)
         return angle - self._hidden
 
     def value(self, time_s: float) -> float:
-        """Return the measurement, degrees or degrees per second."""
+        """Return the next measurement with its errors and faults, degrees or degrees per second."""
         p = self._parameters
         gain = -p.gain if time_s >= p.reversed_s else p.gain
         value = gain * self._past[0][1] + p.offset_deg + self._noise.gauss(0.0, p.noise_deg)

@@ -14,7 +14,7 @@ class CraneBoom(Protocol):
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius, height and their rates; rad, m, per second."""
+        """Slew angle, radius and height of the tip, then their rates; rad, m, per second."""
 
     def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
         """Advance by step_s seconds; return the tip motion at start, middle and end of the step."""
@@ -31,7 +31,7 @@ class TipBoom:
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius, height and their rates; rad, m, per second."""
+        """Slew angle, radius and height of the tip, then their rates; rad, m, per second."""
         slew, near_far, lift = self._slew, self._near_far, self._lift
         return (
             slew.position,

@@ -34,7 +34,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class TipControllerParameters:
-    """Parameters of the tip controller."""
+    """Cycle, deadbands, lead, braking and posture; rates are fractions of full speed."""
 
     period_s: float = 0.01  # cycle of a common crane controller
     # Deadband of its command input, that of the valves it stands in for: a deployment made for tip
@@ -130,7 +130,7 @@ class TipController:
         }
 
     def _boom_rates(self, near_far: float, lift: float, joints: Vector, limits: Bounds) -> Vector:
-        """Return the rates of the boom joints, fractions of full speed."""
+        """Return the rates of lift, knuckle and extension, fractions of full speed."""
         solver = ResolvedRates(self._boom.jacobian(*joints), self._full, self._p.damping_m_s)
         radius_speed, height_speed = self._tip_full[1] * near_far, self._tip_full[2] * lift
         rates_of_tip = solver.least_squares(radius_speed, height_speed)
@@ -149,7 +149,7 @@ class TipController:
         return rates
 
     def _posture(self, joints: Vector, free: Vector, activity: float) -> float:
-        """Return the self-motion t that draws the joints to the middle of their ranges."""
+        """Return the factor of `free` that draws joints to mid-range; activity: command, 0 .. 1."""
         pull = sum(
             n * (middle - q) / half
             for n, q, (middle, half) in zip(free, joints, self._middles, strict=True)
@@ -157,7 +157,7 @@ class TipController:
         return self._p.posture * activity * pull
 
     def _bounds(self, name: str, position: float, full_speed: float) -> tuple[float, float]:
-        """Return lowest and highest rate from which the joint stops smoothly before its margin."""
+        """Return lowest and highest rate, fractions of full speed, to stop before the margins."""
         low, high = self._ranges[name]
         slope = self._p.braking_1_s / full_speed
         return (

@@ -53,7 +53,7 @@ class TowerParameters(RopeParameters):
         self.check("tower", _ALLOWED | reach)
 
     def boom(self, ends: EndParameters) -> "RopedBoom":
-        """Return trolley and rope in the start pose."""
+        """Return jib, trolley and rope in the start pose."""
         reach = self.start_radius_m, self.radius_min_m, self.radius_max_m
         height = self.jib_m, self.jib_m, self.jib_m
         jib = TipBoom(
@@ -69,7 +69,7 @@ class RopedBoom(OverheadBoom):
 
     Args:
         carrier: the boom that carries the rope.
-        fixed: coordinate of this boom that has no drive.
+        fixed: axis of this boom that no command moves.
         parameters: hoist and rope.
         ends: end stops of the hoist.
     """
@@ -86,7 +86,7 @@ class RopedBoom(OverheadBoom):
         self.carrier = carrier
 
     def swing(self, sway: "Sway") -> None:
-        """Let the load hang at these angles of a grapple."""
+        """Hang the load at theta5 in slew direction, theta6 inwards; rates are ignored."""
         inwards = math.sin(sway.theta6_rad)
         across = math.cos(sway.theta6_rad) * math.sin(sway.theta5_rad)
         down = math.sqrt(1.0 - inwards * inwards - across * across)
@@ -120,11 +120,11 @@ class RopedBoom(OverheadBoom):
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius and height of the point from which the rope hangs, and their rates."""
+        """Slew angle, radius and height of the rope's upper end, then rates; rad, m, per second."""
         return self.carrier.pose
 
     def advance(self, step_s: float) -> None:
-        """Move on by step_s seconds."""
+        """Move boom, rope and load on by step_s seconds."""
         self._hang(step_s, *map(_acceleration, self.carrier.advance(step_s)))
 
 

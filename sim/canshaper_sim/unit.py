@@ -67,7 +67,7 @@ class Unit:
             parameters: full speeds of the axes, which the unit does not have.
 
         Raises:
-            DesignError: the unit has other axes or another step.
+            DesignError: an axis moves no tip, or the unit lacks a variable or has another step.
             DriveError: the unit does not start.
         """
         if others := {*axes} - {*TIP_AXES, ROTATOR}:
@@ -129,12 +129,12 @@ class _Slave:
         weakref.finalize(self, _end, slave)
 
     def read(self, references: Sequence[int]) -> list[float]:
-        """Return the values of these variables."""
+        """Return the values of the variables with these FMI value references."""
         values: list[float] = self._get(references)
         return values
 
     def step(self, time_s: float, dt_s: float, commands: Mapping[int, float]) -> None:
-        """Hold these commands for dt_s seconds from time_s on.
+        """Hold these commands (value reference -> value) for dt_s seconds from time_s on.
 
         Raises:
             DriveError: the unit fails.
@@ -154,7 +154,7 @@ def _end(slave: Any) -> None:
 
 
 class UnitCrane(Crane):
-    """A crane moved by a unit; it has no load, no initial swing and no parameters of our crane."""
+    """A crane moved by a unit: no load, no initial swing, no parameter but the start pose."""
 
     def __init__(
         self,
@@ -181,7 +181,7 @@ class UnitCrane(Crane):
         return CraneState(self._time_s, *pose, *speeds, *sway)
 
     def speed(self, axis: str) -> float:
-        """Return the speed of an axis, rad/s or m/s."""
+        """Return the speed of an axis that the unit moves, rad/s or m/s."""
         return self._values[len(self._moved) + self._moved.index(axis)]
 
     def opening(self, axis: str) -> float:
@@ -190,6 +190,8 @@ class UnitCrane(Crane):
 
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
         """Hold the commands for dt_s seconds; an axis without a command keeps its last one.
+
+        Commands of axes that the unit does not move are ignored.
 
         Raises:
             DriveError: the unit fails.

@@ -59,7 +59,8 @@ class ValveParameters:
     def flow(self, command: float) -> float:
         """Return the steady-state speed for a command, behind deadband and flow limit; fractions.
 
-        Just outside the deadband the flow starts at zero; a full command gives a full flow.
+        Just outside the deadband the flow starts at zero. A full positive command gives full flow,
+        a negative one ``negative_gain`` times as much; a gain above 1 raises its flow limit too.
         """
         deadband = self.deadband
         if command < 0.0:
@@ -79,11 +80,11 @@ class ValveParameters:
 
 
 class Valve:
-    """A valve in motion: call `set_command`, then `advance` in steps, read `speed`.
+    """A valve in motion: call `set_command`, `advance` in steps, read `speed`, part of full speed.
 
     `supply` is the part of its demanded oil that the valve gets in the next step, 1 unless
     pump or load set it.
-    `ease` is the factor of the load on the flow where no compensator cancels it.
+    `ease` is the factor of the load on the flow, 1 where a compensator cancels it.
     """
 
     __slots__ = (

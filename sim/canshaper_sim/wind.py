@@ -61,7 +61,7 @@ class Wind:
         self.force_n = 0.5 * AIR_KG_M3 * p.drag_m2 * speed * abs(speed)
 
     def push(self, slew_rad: float, mass_kg: float) -> Push:
-        """Return the force on a mass, N/kg: outwards, in slew direction, upwards."""
+        """Return the force on what has this mass, N/kg: outwards, in slew direction, upwards."""
         angle = math.radians(self._parameters.heading_deg) - slew_rad
         push = self.force_n / mass_kg
         return push * math.cos(angle), push * math.sin(angle), 0.0

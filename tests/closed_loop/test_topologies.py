@@ -4,6 +4,7 @@ Joysticks and valves may be nodes of J1939, or of CANopen, which follow in ACTIV
 """
 
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +14,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.report.metrics import compare
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.operator import SCRIPTS
-from tests.rigs.files import CONFIG
+from tests.rigs.files import CONFIG, machine_file
 
 
 @cache
@@ -51,6 +52,13 @@ def test_a_crane_is_the_first_part_of_the_names_of_its_axes() -> None:
     assert list(rear.axes) == ["slew", "near_far", "lift", "rotator"]
     assert list(rear.config.buses) == ["rear"]
     assert list(rear.joysticks) == ["rear_left", "rear_right", "rear_rocker"]
+
+
+def test_a_crane_may_have_a_name_that_another_begins_with(tmp_path: Path) -> None:
+    file = machine_file(tmp_path, "two-cranes", ("rear_", "front_left_"))
+    deployment = load_deployment(file)
+    for crane in ("front", "front_left"):
+        assert list(one_crane(deployment, crane).axes) == ["slew", "near_far", "lift", "rotator"]
 
 
 @pytest.mark.parametrize("file", ["forwarder.yaml", "forwarder-joints.yaml"])

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from canshaper.errors import DesignError
 from canshaper_sim.axes import BRIDGE, HOIST, NEAR_FAR, SLEW
 from canshaper_sim.crane import Crane, CraneParameters, RopeCrane
 from canshaper_sim.grapple import Grapple, Sway
+from canshaper_sim.luffing import LuffingParameters
 from canshaper_sim.overhead import OverheadParameters, drive
 from canshaper_sim.tower import RopedBoom, TowerParameters
 
@@ -88,6 +90,16 @@ def test_the_tip_of_a_telehandler_goes_as_its_boom() -> None:
     assert state.radius_m == pytest.approx(long_m * math.cos(luff), abs=0.02)
     assert state.height_m == pytest.approx(2.5 + long_m * math.sin(luff), abs=0.02)
     assert one.boom.axes[HOIST].position == pytest.approx(-8.0 - 0.8 * 2.85, abs=0.15)
+
+
+def test_a_telehandler_starts_between_the_stops_of_its_boom() -> None:
+    for start_deg in (-20.0, 80.0):
+        own = LuffingParameters(start_luff_deg=start_deg)
+        boom = RopeCrane(CraneParameters(luffing=own), kind="luffing").boom
+        luff = boom.axes["lift_cylinder"].position
+        assert math.degrees(luff) == pytest.approx(start_deg, abs=1e-6)
+    with pytest.raises(DesignError, match=r"luffing: start_luff_deg: expected -20.0 .. 80.0, got"):
+        LuffingParameters(start_luff_deg=82.0)
 
 
 def test_a_tip_that_rises_faster_swings_faster() -> None:

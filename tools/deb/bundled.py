@@ -7,7 +7,11 @@ LONGEST_NAME = 60  # some packages put the whole text of the licence where its n
 
 
 def licence(package: Distribution) -> str:
-    """Name of the licence, from the newest of the fields that packages have used for it."""
+    """Return the licence's name, from the newest of the fields that packages have used for it.
+
+    Raises:
+        SystemExit: no field has a name of less than 60 letters.
+    """
     classifiers = package.metadata.get_all("Classifier") or []
     named = [c.rpartition(" :: ")[2] for c in classifiers if c.startswith("License ::")]
     names = ("License-Expression", "License")
@@ -19,7 +23,7 @@ def licence(package: Distribution) -> str:
 
 
 def main() -> None:
-    """Print the lines."""
+    """Print a line for each package in the directory that the command line names."""
     for package in sorted(distributions(path=[sys.argv[1]]), key=lambda p: p.name.lower()):
         print(f" {package.name} {package.version}: {licence(package)}")
 

@@ -16,7 +16,7 @@ VENDORED = ("studio/static/vendor", "data/site")
 
 
 def texts(library: Path) -> Iterator[tuple[str, str]]:
-    """Title and text of each."""
+    """Yield (title, text) of each licence; for a package without one a sentence says so."""
     for about in sorted(library.glob("*.dist-info")):
         one = Distribution.at(about)
         title = f"{one.name} {one.version}: {licence(one)}"

@@ -29,7 +29,7 @@ LICENCES = LicenseFactory()
 
 
 def packages(library: Path) -> Iterator[Component]:
-    """The Python packages in a directory, but for canshaper itself."""
+    """Yield the Python packages in a directory, but for canshaper itself."""
     for one in sorted(distributions(path=[str(library)]), key=lambda d: d.name.lower()):
         if one.name != "canshaper":
             yield Component(
@@ -42,7 +42,11 @@ def packages(library: Path) -> Iterator[Component]:
 
 
 def scripts(vendor: Path) -> Iterator[Component]:
-    """The JavaScript libraries that lie in the package, by the banner of each file."""
+    """Yield the JavaScript libraries in a folder, by the banner in the first line of each file.
+
+    Raises:
+        SystemExit: a file has no banner.
+    """
     for path in sorted(vendor.glob("*.js")):
         with path.open(encoding="utf-8") as file:
             banner = BANNER.match(file.readline())
@@ -62,7 +66,7 @@ def scripts(vendor: Path) -> Iterator[Component]:
 
 
 def theme(site: Path) -> Iterator[Component]:
-    """The theme of the site, by the name of the file with its licence."""
+    """Yield the theme of the site, by the name of the file with its licence; none without one."""
     for path in sorted((site / "assets").glob("*.LICENSE")):
         if named := THEME.fullmatch(path.name):
             yield Component(
@@ -75,7 +79,7 @@ def theme(site: Path) -> Iterator[Component]:
 
 
 def bill(library: Path, version: str) -> str:
-    """The whole bill, as JSON."""
+    """Return the bill of canshaper VERSION and of all in ``library``, as JSON."""
     root = Component(
         name="canshaper",
         version=version,

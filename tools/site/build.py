@@ -30,7 +30,7 @@ UNUSED = ("assets/javascripts/lunr", "**/*.map", "sitemap.xml*")
 
 
 def reference() -> Iterator[str]:
-    """Lines of the page of the public API."""
+    """Yield the page of the public API, in Markdown for mkdocstrings."""
     import canshaper  # noqa: PLC0415
 
     yield "# API reference"
@@ -40,7 +40,7 @@ def reference() -> Iterator[str]:
 
 
 def commands() -> Iterator[str]:
-    """Lines of the page of all commands: what --help prints."""
+    """Yield the page of all commands in Markdown: what --help of each prints."""
     from typer.testing import CliRunner  # noqa: PLC0415
 
     from canshaper.cli.app import Verbs, app  # noqa: PLC0415
@@ -55,7 +55,7 @@ def commands() -> Iterator[str]:
 
 
 def stage() -> None:
-    """Lay the sources as the repository has them, and what is generated next to them."""
+    """Make out/pages anew: links to the sources at their places, and generated pages."""
     shutil.rmtree(PAGES, ignore_errors=True)
     for name in SOURCES:
         place = PAGES / name
@@ -69,7 +69,7 @@ def stage() -> None:
 
 
 def main() -> int:
-    """Build it; an exit code."""
+    """Build the site; return 0, or 1 if mkdocs refuses the pages."""
     os.chdir(ROOT)
     sys.path.insert(0, str(ROOT))  # tools.site.diagram, for mkdocs.yml
     os.environ["NO_MKDOCS_2_WARNING"] = "1"

@@ -6,5 +6,5 @@ import mermaidx
 
 
 def drawn(source: str, _language: str, _class: str, _options: object, _md: object, **_: Any) -> str:
-    """A mermaid block as a picture in the page."""
+    """Return a block of Mermaid as HTML with a picture in SVG."""
     return f'<div class="drawn">{mermaidx.render(source).svg()}</div>'
