@@ -87,7 +87,8 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             continue
         extended = number[-1] in "xX"
         try:
-            time_ns = before_ns or int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+            own_ns = int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+            time_ns = (relative and before_ns) or own_ns
             can_id, length, payload = _numbers(number, count, data, base, fd=on_fd)
         except ValueError:
             raise place.error(shown(raw), ASC_NUMBERS) from None
