@@ -249,7 +249,7 @@ def joystick_commands(
 
 
 def valve_part(axis: BoundAxis, layout: Layout, data: bytes) -> float | None:
-    """Return the setpoint in a valve frame, -1 to 1 of full; None for a wrong length or value."""
+    """Return the setpoint in a valve frame, -1 to 1; None for a wrong length or no valid value."""
     if len(data) != axis.valve_message.length:
         return None
     steps = axis.valve.read(layout.decode(data))

@@ -92,9 +92,8 @@ class AxisMetrics:
 class AxisComparison:
     """Measures of one axis in both drives; reductions are 100 (1 - shaped / raw) percent.
 
-    A reduction is None if either measure is None, as without sway, if the raw one is below
-    ``MIN_RAW_DEG``, and if the raw drive swings above the horizontal. It is negative if shaping
-    made the swing larger.
+    A reduction is None without both measures, for a raw one below ``MIN_RAW_DEG``, and for a raw
+    drive that swings above the horizontal; it is negative if shaping made the swing larger.
     """
 
     raw: AxisMetrics
@@ -231,10 +230,7 @@ def swings_over(recording: Recording) -> bool:
 
 
 def _reduction_of(raw: Recording) -> Callable[[float | None, float | None], float | None]:
-    """Return the function of a raw and a shaped measure that gives the reduction in percent.
-
-    It gives None for all measures if this raw drive swings above the horizontal.
-    """
+    """Return a function of two measures to the reduction, %; always None if ``raw`` swings over."""
     return (lambda _raw, _shaped: None) if swings_over(raw) else _reduction_pct
 
 

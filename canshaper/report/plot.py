@@ -102,8 +102,7 @@ def _draw_blocks(
 def finding(name: str, axis: Mapping[str, Any]) -> str:
     """Return the result for one axis as text: "Near-far: residual swing 15.9° → 0.4° (−97 %)".
 
-    Without a raw residual the text has the peak. Swing in the other plane is added if its reduction
-    is known.
+    Without a raw residual the text has the peak. Swing in the other plane needs its reduction.
     """
     measure = "residual" if axis["raw"]["residual_deg"] is not None else "peak"
     words = {"residual": "residual swing", "peak": "largest swing"}
