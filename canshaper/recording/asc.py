@@ -26,6 +26,9 @@ def lines(file: BinaryIO, place: Place, *, last: bool = False) -> Iterator[bytes
         file: the log.
         place: position of the reader, in which the lines are counted.
         last: the last line needs no end; else a line without one raises CutOffError.
+
+    Raises:
+        LogError: a line is as long as ``LONGEST_LINE``, or cut off.
     """
     for line in iter(partial(file.readline, LONGEST_LINE), b""):
         place.number += 1
@@ -56,7 +59,7 @@ ASC_NUMBERS = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with n
 
 
 def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Yield the data frames of Vector's ASC; skip statistics, comments and events silently."""
+    """Yield the data frames of Vector's ASC; count other frames, skip other lines silently."""
     base, relative, before_ns = 16, False, 0
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").rstrip()
@@ -84,7 +87,8 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             continue
         extended = number[-1] in "xX"
         try:
-            time_ns = before_ns or int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+            own_ns = int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+            time_ns = (relative and before_ns) or own_ns
             can_id, length, payload = _numbers(number, count, data, base, fd=on_fd)
         except ValueError:
             raise place.error(shown(raw), ASC_NUMBERS) from None
@@ -92,7 +96,7 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, bool]:
-    """Read a line without a frame; return the number base and whether times are relative."""
+    """Return number base and whether times are relative, after this line without a data frame."""
     if header := _BASE.match(line):
         base = 10 if header[1].lower() == "dec" else 16
         relative = bool(header[2]) and header[2].lower() == "relative"
@@ -104,10 +108,12 @@ def _read_on(line: str, base: int, relative: bool, place: Place) -> tuple[int, b
 def _numbers(
     number: str, count: str, data: list[str], base: int, *, fd: bool
 ) -> tuple[int, int, bytes]:
-    """Return id, length and data of a line; on a CAN FD channel the length is decimal.
+    """Return id, length in bytes and data of a line.
+
+    On a CAN FD channel the length is decimal; on another it is in ``base``, and at most 8.
 
     Raises:
-        ValueError: a cell is no number.
+        ValueError: a cell is no number, or a byte is more than 255.
     """
     length = int(count) if fd else min(8, int(count, base))
     digits = "".join((number, count, *data[:length]))
@@ -118,11 +124,11 @@ def _numbers(
 
 
 def _data(words: list[str]) -> list[str]:
-    """Return length and data of a line of a CAN FD channel, whose frames may be of both kinds.
+    """Return [length, byte, ...] from the words after the id, in a line of a CAN FD channel.
 
-    A remote frame has the length R. If length or flags are no numbers, the length is empty and the
-    caller reports it. Before the data stand a name (not always), two flags and the length code;
-    after the data stand the frame's duration, number of bits and flags.
+    A remote frame gives ["R"]; a wrong length or wrong flags give [""], which the caller reports.
+    Before the data stand a name (not always), two flags, the length code and the length; after the
+    data stand the frame's duration, number of bits and flags.
     """
     if words and words[0] not in ("0", "1"):
         words = words[1:]
@@ -183,7 +189,7 @@ def _begin_us(days: str, place: Place) -> int:
     """Return the start time of the log in microseconds since 1970.
 
     Raises:
-        LogError: ``days`` is no date.
+        LogError: ``days`` is no number of days since 1899-12-30, or far from any date.
     """
     try:
         return round((_EPOCH + timedelta(days=float(days))).timestamp() * 1e6)
@@ -194,8 +200,10 @@ def _begin_us(days: str, place: Place) -> int:
 def _frame(cells: list[str], columns: str, begin_ns: int, place: Place) -> TimedFrame | None:
     """Return the data frame of a line; None for a line with another frame or an event.
 
+    Each letter of ``columns`` names a cell, as in ``COLUMNS``; ``begin_ns`` is the log's start.
+
     Raises:
-        LogError: the frame is not complete.
+        LogError: the frame is not complete, is too long, or its id does not fit.
         ValueError, IndexError: the line does not have these columns.
     """
     at = columns.index

@@ -27,7 +27,7 @@ _new = tuple.__new__  # TimedFrame(...) in half the time
 
 
 def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Yield the data frames of all bus events by time, to the ns; one group keeps its order."""
+    """Yield the data frames of all groups of bus events, merged by their times, to the ns."""
     with tempfile.TemporaryDirectory() as folder:
         path = place.path
         if path.suffix.lower() != ".mf4":  # packed
@@ -46,7 +46,7 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _handed_over(pipe: IO[bytes], place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames that the child process has read."""
+    """Yield the frames that the child process has read; raise LogError for its fault."""
     while True:
         try:
             part = marshal.load(pipe)
@@ -67,7 +67,7 @@ def _handed_over(pipe: IO[bytes], place: Place) -> Iterator[TimedFrame]:
 
 
 def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of python-can's database; it has no channels and does not mark CAN FD."""
+    """Yield the data frames of python-can's database at ``place.path``; all channels are empty."""
     left_out = place.left_out
     try:
         with closing(sqlite3.connect(place.path)) as connection:
@@ -88,7 +88,7 @@ def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def _nanoseconds(time_s: float) -> int:
-    """Return a time in ns, rounded to what its float holds: ns of a short time, us of a date."""
+    """Return a time in ns, rounded to what its float holds: to ns below ``FINE_S``, else to us."""
     return round(time_s * 1e9) if time_s < FINE_S else round(time_s * 1e6) * 1000
 
 
@@ -110,7 +110,7 @@ DAMAGED = (
 
 
 def mcap(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of topics with the schema of ``mcap_write``, in the order of the file."""
+    """Yield the data frames of topics with the schema canshaper.CanFrame, in the file's order."""
     try:
         from mcap.exceptions import McapError  # noqa: PLC0415  (an extra)
         from mcap.stream_reader import CRCValidationError  # noqa: PLC0415

@@ -44,7 +44,10 @@ _DROPPED = re.compile(rb"DROPCOUNT: dropped (\d{1,10}) CAN frames? on .*\s*")
 
 
 def candump(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Yield frames of ``candump -L``, ``candump -l`` and python-can's logger; times in us or ns."""
+    """Yield the data frames of candump, in a file or on the screen, and of python-can's logger.
+
+    Times from frame to frame (``candump -t d``) are summed up, with a note in ``place``.
+    """
     quick = _QUICK.fullmatch
     sources: dict[bytes, tuple[str, int, bool] | None] = {}
     rows = lines(file, place)
@@ -82,7 +85,7 @@ def candump(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def _are_differences(head: bytes) -> bool:
-    """Return whether the times of a log are differences, each since the frame before."""
+    """Return whether times in the first lines seem to be differences; False if there are few."""
     matches = (_PADDED.match(line) for line in head.split(b"\n", MOST_STAMPS)[:-1])
     stamps = [int(f"{one[2].decode()}{one[3].decode()}") for one in matches if one]
     if len(stamps) < LEAST_STAMPS:
@@ -96,7 +99,7 @@ def _are_differences(head: bytes) -> bool:
 
 
 def _summed(rows: Iterator[bytes]) -> Iterator[bytes]:
-    """Yield lines with times since the first line in place of the times since the line before."""
+    """Yield lines with each time since the line before replaced by the sum of all up to it."""
     time_us = 0
     for row in rows:
         if (stamp := _PADDED.match(row)) is None:
@@ -107,7 +110,11 @@ def _summed(rows: Iterator[bytes]) -> Iterator[bytes]:
 
 
 def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] | None:
-    """Return channel, id and whether the id is extended; None for an error frame."""
+    """Return (channel, id, extended) of a ``source`` b"CHANNEL ID"; None for an error frame.
+
+    Raises:
+        LogError: the id has neither 3 nor 8 digits, or does not fit.
+    """
     channel, word = source.split()
     can_id, extended = int(word, 16), len(word) == 8
     if len(word) not in (3, 8):
@@ -120,10 +127,10 @@ def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] |
 
 
 def _screen(line: bytes, place: Place) -> TimedFrame | None:
-    """Return the frame of a line as candump shows it on the screen; None for other frames.
+    """Return the data frame of a line as candump shows it on the screen; None for another line.
 
     Raises:
-        LogError: candump shows no such line, or the line has no time.
+        LogError: candump shows no such line, it has no time, or its frame is not whole.
     """
     match = _SCREEN.fullmatch(line)
     if match is None:
@@ -168,12 +175,12 @@ _BUSMASTER = re.compile(
 
 
 def log(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of a ``.log`` file: of BUSMASTER by its first line, else of candump."""
+    """Yield the data frames of a ``.log`` file: of BUSMASTER by its first line, else of candump."""
     return (busmaster if file.peek(12)[:12] == b"***BUSMASTER" else candump)(file, place)
 
 
 def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of Kvaser's plain text."""
+    """Yield the data frames of Kvaser's plain text, which stand below the names of the columns."""
     bases, below = {"id": 16, "data": 16}, False
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").rstrip()
@@ -200,7 +207,7 @@ def kvaser(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def busmaster(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Yield frames of BUSMASTER's log; times count from midnight, the start or the last frame."""
+    """Yield data frames of BUSMASTER; times go on after midnight, relative ones are summed up."""
     base, relative, day_ns, before_ns = 16, False, 0, 0
     for raw in lines(file, place):
         line = raw.decode("utf-8", "replace").strip()
@@ -223,7 +230,10 @@ def busmaster(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def _frame(place: Place, raw: bytes, bases: dict[str, int], *what: Any) -> TimedFrame:
-    """Return the frame with these values: time, channel, id, extended, length and data."""
+    """Return the frame of (time in ns, channel, text of id, extended, length, texts of bytes).
+
+    ``raw`` is the line, for a LogError; ``bases`` has the number bases of "id" and "data".
+    """
     time_ns, channel, number, extended, length, words = what
     try:
         can_id = int(number, bases["id"])

@@ -42,7 +42,7 @@ _PADDING = 8
 
 
 def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of Vector's BLF; times to the ns or to ten us, as the logger wrote them."""
+    """Yield the data frames of Vector's BLF; times to the ns or to ten us, as the logger wrote."""
     wrong = cut_off(file)  # python-can ignores this silently
     file.seek(0)
     try:
@@ -68,7 +68,7 @@ class _Reader(can.BLFReader):
         self._start_ns = round(self.start_timestamp * 1000) * 1_000_000
 
     def _parse_data(self, data: bytes) -> Iterator[Any]:
-        """Yield the frames of one container; ``_pos`` is the start of the first object not read."""
+        """Yield the data frames of a container; set ``_pos`` to the first object not read."""
         find, start, frame_of = data.find, _OBJECT.unpack_from, self._frame
         at, end, last = 0, len(data), len(data) - _OBJECT.size
         while True:
@@ -90,7 +90,10 @@ class _Reader(can.BLFReader):
                     yield frame
 
     def _frame(self, data: bytes, kind: int, begin: int, body: int, end: int) -> TimedFrame | None:
-        """Return the data frame of an object from ``begin`` to ``end``; None for another frame."""
+        """Return the data frame of an object; count another or an impossible one, and return None.
+
+        ``begin`` and ``end`` bound the object in ``data``; its own fields begin at ``body``.
+        """
         place = self._place
         place.number += 1
         if body + _BYTES[kind] > end:
@@ -119,7 +122,7 @@ class _Reader(can.BLFReader):
 def _fd(
     data: bytes, kind: int, begin: int, body: int, end: int
 ) -> tuple[int, int, int, int, bytes]:
-    """Return channel, remote flag, largest length, id and data of a frame on a CAN FD channel."""
+    """Return (channel, remote flag, largest length, id with its flag, data) of a CAN FD object."""
     if kind == _FD:
         channel, flags, number, fd_flags, count = _FD_FRAME.unpack_from(data, body)
         remote, is_fd = flags & _REMOTE, fd_flags & _IS_FD
@@ -135,7 +138,7 @@ def _fd(
 
 
 def cut_off(file: BinaryIO) -> str:
-    """Return where a BLF file ends within an object; an empty text if it does not."""
+    """Return where a BLF file ends within an object; empty if not, or if damaged otherwise."""
     file.seek(0)
     head = file.read(8)
     if len(head) < 8 or head[:4] != b"LOGG":
@@ -165,7 +168,7 @@ MOST_BLOCK = 1 << 24
 
 
 def pcap(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of a pcap or pcapng capture; its first bytes tell which."""
+    """Yield the data frames of a pcap or pcapng capture; its first bytes tell which."""
     head = file.peek(4)[:4]
     try:
         if head == SECTION:
@@ -214,7 +217,7 @@ def _blocks(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
 
 
 def _interface(body: bytes, order: str, name: str) -> tuple[str, int]:
-    """Return the name of an interface, and the number of its time units in a second."""
+    """Return the name of an interface, ``name`` if it has none, and its time units per second."""
     per_s, at = 1_000_000, 8
     while at + 8 <= len(body):
         code, count = struct.unpack_from(f"{order}2H", body, at)
@@ -234,7 +237,7 @@ def _check_link(link: int, place: Place) -> None:
 
 
 def _frame(data: bytes, time_ns: int, channel: str, place: Place) -> Iterator[TimedFrame]:
-    """Yield the data frame of a packet, if the packet is one."""
+    """Yield the data frame of a packet, or count it as left out."""
     place.number += 1
     word = int.from_bytes(data[:4])
     if len(data) < 8 or not data[4] <= min(len(data) - 8, MOST_BYTES):

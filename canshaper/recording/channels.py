@@ -34,13 +34,13 @@ class Kind(Enum):
 def bus_of_channel(
     deployment: Deployment, channels: Collection[str], given: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return the name of the bus for each channel of a log.
+    """Return bus by channel of a log, without the channels that belong to no bus.
 
     Args:
         deployment: the machine.
         channels: channels of the log.
         given: channel by bus from the command line. For other buses the function tries the
-            deployment's own channel, then the name of the bus, then the only channel.
+            deployment's own channel, then the name of the bus; for a single bus, the only channel.
 
     Raises:
         LogError: a bus has no channel in the log, or two buses have the same channel.
@@ -131,7 +131,7 @@ class Place:
         path: the log.
         unit: name of what ``number`` counts: line or frame.
         number: number of the present line or frame, from 1.
-        left_out: counts by kind of frames that are no data frames, and of lines of tools.
+        left_out: number of left-out frames and lines by kind, such as "remote", "impossible".
         notes: other things that a person must know about the log.
     """
 
@@ -150,7 +150,7 @@ class Place:
         return CutOffError(f"{self}: the log is cut off: {reason}")
 
     def checked(self, frame: TimedFrame, length: int) -> TimedFrame:
-        """Return the frame if it has ``length`` bytes and its id fits; else raise LogError."""
+        """Return the frame; raise LogError for another length or an id that does not fit."""
         if len(frame.data) != length or length > MOST_BYTES:
             raise self.error(f"{len(frame.data)} of {length} bytes", "all of them")
         if not fits(frame.can_id, extended=frame.extended):
@@ -173,7 +173,7 @@ class InputFinder(Generic[_Input]):
     """Finds the input of a frame by its identifier; for J1939 by group and source, at any priority.
 
     If a message may come from any address, the finder uses the first sender until it is silent for
-    ``timeout_ms``.
+    ``timeout_ms``; frames of other senders have no input.
 
     Args:
         buses: buses of the machine by name.
@@ -232,7 +232,7 @@ class _Noted(Generic[_Input]):
 def joystick_commands(
     joystick: BoundJoystick, axes: Mapping[str, BoundAxis], data: bytes
 ) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the raw values in a joystick's frame, and the demand of each of its axes, -1 to 1.
+    """Return the raw values by signal in a joystick's frame, and the demands by axis, -1 to 1.
 
     Both are empty for a frame of another length; an axis with an invalid demand is left out.
     """
@@ -249,7 +249,7 @@ def joystick_commands(
 
 
 def valve_part(axis: BoundAxis, layout: Layout, data: bytes) -> float | None:
-    """Return the command in a valve frame, part of full; None for a wrong length or value."""
+    """Return the setpoint in a valve frame, -1 to 1; None for a wrong length or no valid value."""
     if len(data) != axis.valve_message.length:
         return None
     steps = axis.valve.read(layout.decode(data))

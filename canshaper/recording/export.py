@@ -33,7 +33,10 @@ MOST_CODE_BITS = 8  # longest signal whose values are names
 def exporting(
     path: Path | None, deployment: Deployment, parameters: CraneParameters | None = None
 ) -> Iterator["Export | None"]:
-    """Open a file of one of ``EXTRAS`` for the export of a drive; give None if path is None.
+    """Open an MCAP or MF4 file, by its suffix, for the export of a drive; None gives None.
+
+    An existing file is replaced. ``parameters`` are those of the crane to draw, else the
+    deployment's.
 
     Raises:
         UsageError: the file has another suffix, or its extra is not installed.
@@ -53,7 +56,7 @@ def exporting(
 
 
 def _writer(path: Path, buses: Sequence[str]) -> Writer:
-    """Return the writer for the suffix of a file."""
+    """Return the writer for a file's suffix; raise UsageError for another or a missing extra."""
     extra = EXTRAS.get(path.suffix.lower())
     if extra is None:
         raise UsageError(f"--export: expected a file with {' or '.join(EXTRAS)}, got {path}")
@@ -88,7 +91,7 @@ class Export:
         self._last_ns = 0
 
     def frame(self, frame: ReceivedFrame) -> None:
-        """Take a frame of a bus; states, reasons and pose are those that the frames report."""
+        """Write a frame of a bus, with the state, reason or pose of the crane that it reports."""
         decoded = self._take(frame, sent=False)
         if frame.kind:
             return
@@ -105,7 +108,7 @@ class Export:
             self._axes[name](frame.time_ns, row)
 
     def tick(self, tick: Tick, result: Result) -> None:
-        """Take a tick of a replay; the pose is that of a crane simulated behind its frames."""
+        """Write a tick of a replay but its ``logged``; its valve frames move a simulated crane."""
         for time_ns, frame in tick.received:
             self._take(self._received(time_ns, frame), sent=False)
         for frame in tick.others:
@@ -121,7 +124,7 @@ class Export:
         self._crane.simulate(tick.now_ns, result.sent)
 
     def seen(self, frame: Frame, time_s: float) -> None:
-        """Take a frame of a simulated drive."""
+        """Write a frame of a simulated drive, ``time_s`` seconds after its start."""
         self.frame(self._received(round(time_s * 1e9), frame))
 
     def _received(self, time_ns: int, frame: Frame) -> ReceivedFrame:
@@ -151,7 +154,7 @@ class _Decoder:
         self._rows: dict[str, Row] = {}
 
     def decode(self, frame: ReceivedFrame) -> tuple[str, dict[str, float]] | None:
-        """Write the signals of a frame; return the name of its message and the signals' values."""
+        """Write a frame's signals; return (message, values by signal), None if not decoded."""
         key = frame.bus, frame.can_id, frame.extended
         if key not in self._known:
             self._known[key] = self._found(frame)
@@ -220,7 +223,7 @@ class _CranePose:
         self._tick_s = deployment.config.tick_ms / 1000.0
 
     def measured(self, time_ns: int, message: str, values: Mapping[str, float]) -> None:
-        """Take the values of a message of the crane, as ``canshaper sim`` sends it."""
+        """Write the pose at each GrappleSway of ``canshaper sim`` that follows a TipPosition."""
         if message == "TipPosition":
             self._tip = values["SlewAngle"], values["Radius"], values["Height"]
         elif message == "GrappleSway" and self._tip:
@@ -228,7 +231,7 @@ class _CranePose:
             self._write(time_ns, (*self._tip, across, along))
 
     def simulate(self, time_ns: int, sent: Sequence[Frame]) -> None:
-        """Drive the simulated crane for a tick with the sent valve frames."""
+        """Drive the simulated crane, if there is one for the axes, for a tick; write its pose."""
         if self._machine is None:
             return
         data = {frame[:3]: frame.data for frame in sent}

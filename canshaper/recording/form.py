@@ -29,7 +29,7 @@ class Group(NamedTuple):
 
 
 Row = Callable[[int, Sequence[float]], None]
-"""Writes the values of a group at a time in ns since 1970."""
+"""Writes the values of a group at a time in ns, in the order of its channels."""
 Point = tuple[float, float, float]
 """x along the boom that has not slewed, y, z upwards, in m from the foot of the pillar."""
 
@@ -38,7 +38,7 @@ class Writer(Protocol):
     """A file of one format; times are ns since 1970, or since the start of a log."""
 
     def frame(self, frame: ReceivedFrame, *, sent: bool = False) -> None:
-        """Write a frame as it was on its bus."""
+        """Write a frame as it was on its bus; ``sent``: the replayed program sent it."""
 
     def group(self, group: Group) -> Row:
         """Return a function that writes the values of a new group."""
@@ -70,5 +70,5 @@ POSE = (
 
 
 def install(extra: str) -> str:
-    """Return the text with the command that installs a missing extra."""
+    """Return the end of a message: that something is missing, and the command that installs it."""
     return f"which is missing: pip install 'canshaper[{extra}]'"

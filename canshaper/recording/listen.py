@@ -68,7 +68,7 @@ class ReceivedFrame(NamedTuple):
     flags: int | None = None
 
     def line(self) -> str:
-        """Return the line that ``candump -L`` writes for the frame."""
+        """Return the line that ``candump -L`` writes for the frame, with its line end."""
         seconds, ns = divmod(self.time_ns, 10**9)
         can_id = f"{self.can_id:08X}" if self.extended else f"{self.can_id:03X}"
         data = "R" if self.kind == "remote" else self.data.hex().upper()
@@ -78,7 +78,7 @@ class ReceivedFrame(NamedTuple):
 
 
 class Listener:
-    """Listens to buses.
+    """Opens buses and reads their frames.
 
     Args:
         buses: (name, bus) of each.
@@ -119,7 +119,10 @@ class Listener:
                 self._files.append(opened)
 
     def frames(self, timeout_s: float = LOOK_S) -> list[ReceivedFrame]:
-        """Return all waiting frames by time; wait for up to ``timeout_s`` seconds for the first.
+        """Return the waiting frames by time, at most ``MOST_AT_ONCE`` of each bus.
+
+        It waits for the first one for up to ``timeout_s`` seconds; for ``POLL_S`` if a bus has no
+        file descriptor to wait for.
 
         Raises:
             BusError: a bus can no longer be read.
@@ -143,7 +146,7 @@ class Listener:
         return received
 
     def _python_can(self, one: can.BusABC, name: str, channel: str) -> Iterator[ReceivedFrame]:
-        """Yield the frames of a python-can bus; count errors, raise after many without a frame."""
+        """Yield the frames of a python-can bus; count errors, raise at ``MOST_ERRORS`` in a row."""
         for message in waiting(one, MOST_AT_ONCE):
             if not isinstance(message, Exception):
                 self._failing[name] = 0
@@ -224,21 +227,21 @@ class AxisStatus:
 
 @dataclass(frozen=True, slots=True)
 class HistoryEvent:
-    """One line for people: a new state, or a changed counter."""
+    """One line for people: a new state or reason, or a changed counter."""
 
     time_ns: int
     text: str
 
 
 class History:
-    """Takes frames; keeps the last status of each axis and the service, and notes every change.
+    """Takes frames; keeps the last status of each axis and of the service, and notes changes.
 
     Attributes:
         axes: last status by axis.
         counters: last counters of the service by name.
         last_fault: name of the service's last fault.
         counted_ns: time of the last counters; None before the first.
-        changes: every change, oldest first.
+        changes: the first ``MOST_CHANGES`` changes, oldest first; later ones are dropped.
     """
 
     MOST_CHANGES = 100_000
@@ -257,7 +260,7 @@ class History:
             self._codecs[deployment.status.message.key] = deployment.status
 
     def receive(self, frame: ReceivedFrame) -> str | None:
-        """Take a data frame; return the axis if it is an axis' status, else None."""
+        """Take a data frame; return the axis' name if it is the valid status of one, else None."""
         key = (frame.bus, frame.can_id, frame.extended)
         codec = self._codecs.get(key)
         if codec is None or (values := codec.decode(frame.data)) is None:

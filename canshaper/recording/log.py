@@ -80,8 +80,8 @@ class LogFile:
         progress: called now and then with the part that is read, 0 to 1.
 
     Attributes:
-        left_out: counts by kind of frames that are no data frames, and of lines of tools, in the
-            last iteration.
+        left_out: number of frames and lines that the last iteration left out, by kind, such as
+            "remote" or "impossible".
         disordered: number of frames that stand behind a later frame, by up to
             ``OUT_OF_ORDER_NS``; each comes in the order of the file, with that later time.
     """
@@ -94,11 +94,11 @@ class LogFile:
         self._progress = progress
 
     def __iter__(self) -> Iterator[TimedFrame]:
-        """Yield every frame in the order of the file.
+        """Yield every data frame in the order of the file.
 
         Raises:
             CutOffError: the log is cut off; every whole frame was yielded before.
-            LogError: the log cannot be used.
+            LogError: the log cannot be read or is damaged, has no data frame, or mixes clocks.
         """
         place = Place(self._path)
         self.left_out, self._notes, self.disordered = place.left_out, place.notes, 0
@@ -168,7 +168,7 @@ class LogFile:
         return place.error("no frame", "a log with frames, its suffix that of its format")
 
     def _first_or_out_of_order(self, time_ns: int, last_ns: int | None, place: Place) -> int:
-        """Return the time of a first or out-of-order frame; raise LogError for mixed clocks."""
+        """Return the time of a first frame, or ``last_ns`` for a late one; else raise LogError."""
         if abs(time_ns) > LATEST_NS:
             got = f"a time further than {LATEST_S} s from zero"  # itself too long to be shown
             raise place.error(got, "a date before 2286, or a time from the start of the log")
@@ -238,7 +238,7 @@ class _Utf8(RawIOBase):
 
 
 def _format(place: Place) -> tuple[bool, str]:
-    """Return whether a log is packed, and the suffix of its format."""
+    """Return whether a log is packed, and the suffix of its format; LogError for another one."""
     suffixes = [s.lower() for s in place.path.suffixes]
     packed = suffixes[-1:] == [".gz"]
     suffix = "".join(suffixes[:-1] if packed else suffixes)

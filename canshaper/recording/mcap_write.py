@@ -108,7 +108,7 @@ def _add(message: Any, fields: str, package: str) -> None:
 
 
 def _enum(message: Any, field: Any, texts: Any, scope: str) -> None:
-    """Make a field an enum with these texts; two enums in one message may share names."""
+    """Make a field an enum with these texts by number, changed to valid names, each used once."""
     holder = message.nested_type.add(name=f"{field.name}_")
     field.type, field.type_name = 14, f"{scope}.{holder.name}.Value"
     enum, used = holder.enum_type.add(name="Value"), set()
@@ -151,7 +151,7 @@ class McapWriter:
         self._frame = frame.message
 
     def _channel(self, topic: str, schema: str) -> tuple[int, Any]:
-        """Register a topic for a message of the table; return its number and message class."""
+        """Register a topic for a message of ``_FIELDS``; return its number and message class."""
         number, one = self._schema(Schema(schema))
         return self._mcap.register_channel(topic, "protobuf", number), one.message
 
@@ -202,7 +202,7 @@ class McapWriter:
         return row
 
     def event(self, time_ns: int, text: str) -> None:
-        """Write an event as a line for people."""
+        """Write an event as a foxglove.Log of level INFO, on the topic /events."""
         self._add(self._log, time_ns, timestamp=_stamp(time_ns), level=INFO, message=text)
 
     def pose(self, time_ns: int, boom: Sequence[Point], grapple: Point) -> None:

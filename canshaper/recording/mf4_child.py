@@ -29,9 +29,10 @@ CLASSICAL_BYTES, FD_BYTES = 8, 64
 
 
 def read(path: str) -> Iterator[list[Any] | dict[str, Any]]:
-    """Yield lists of frames, at last the counts of left-out frames and a fault.
+    """Yield lists of rows of ``TimedFrame``, at last a dictionary with "left out" and "fault".
 
-    The fault is (got, expected), or None; expected is empty if a package is missing.
+    "left out" is the number of left-out frames by kind. "fault" is (got, expected) or None; where a
+    package is missing, (its name, "").
     """
     left_out: Counter[str] = Counter()
     fault: tuple[str, str] | None = None
@@ -60,7 +61,7 @@ def read(path: str) -> Iterator[list[Any] | dict[str, Any]]:
 
 
 def _bus_events(mdf: Any) -> Iterator[tuple[int, str, int]]:
-    """Yield index, name and number of records of each group of frames."""
+    """Yield (index, name as in ``GROUPS``, number of records) of each group of frames."""
     for index, group in enumerate(mdf.groups):
         name = next((one.name for one in group.channels if one.name in GROUPS.values()), None)
         if name and group.channel_group.flags & BUS_EVENT:
@@ -68,7 +69,7 @@ def _bus_events(mdf: Any) -> Iterator[tuple[int, str, int]]:
 
 
 def _records(mdf: Any, index: int, count: int, left_out: Counter[str]) -> Iterator[tuple[Any, ...]]:
-    """Yield the frames of a group as rows of ``TimedFrame``; leave out impossible ones."""
+    """Yield the frames of a group as rows of ``TimedFrame``; count impossible ones as left out."""
     start = mdf.header.start_time
     start_ns = int(start.timestamp()) * 10**9 + start.microsecond * 1000
     comment = mdf.groups[index].channel_group.comment if mdf.header.project == PROJECT else ""

@@ -67,7 +67,7 @@ class Mf4Writer:
         self._groups: dict[str, int] = {}
 
     def frame(self, frame: ReceivedFrame, *, sent: bool = False) -> None:
-        """Write a frame as it was on its bus."""
+        """Write a frame as it was on its bus, which is one of ``buses``."""
         time_ns, bus, _, can_id, extended, data, kind, flags = frame
         self._begin(time_ns)
         length = len(data)
@@ -129,7 +129,7 @@ class Mf4Writer:
         return row
 
     def event(self, time_ns: int, text: str) -> None:
-        """Write an event as a line for people."""
+        """Write an event as a text of the channel "events"."""
         self._begin(time_ns)
         self._events.append((time_ns, text))
 
@@ -137,7 +137,7 @@ class Mf4Writer:
         """Write nothing: MF4 has no scenes, and the group "crane" has the values."""
 
     def close(self) -> None:
-        """Write the file."""
+        """Write all that was collected into the file, which is empty until then."""
         try:
             for kind, held in self._frames.items():
                 if held:
@@ -163,7 +163,7 @@ class _Table:
         self._group, self._index = group, -1
 
     def write(self, mdf: Any, seconds: Any) -> None:
-        """Append the rows to those already written."""
+        """Append the rows to those already written; ``seconds`` converts their times from ns."""
         times, *columns = zip(*self.rows, strict=True)
         self.rows.clear()
         channels = self._group.channels
@@ -185,7 +185,7 @@ class _Table:
 
 
 def _texts(channel: Channel) -> dict[str, object] | None:
-    """Return the texts of a code's values, as asammdf takes them."""
+    """Return the texts of a code's values as asammdf takes them; None if it is no code."""
     if channel.texts is None:
         return None
     names: dict[str, object] = {"default_addr": b"unknown"}

@@ -22,19 +22,22 @@ OF_A_FRAME = frozenset((Kind.RX, Kind.TX, Kind.FAILED, Kind.WITHHELD))
 
 
 def of_same_files(box: Box, deployment: Deployment) -> bool:
-    """Return whether a black box is of this deployment, by the hashes of its files."""
+    """Return whether a box is of this deployment, by hashes of its files and added packages."""
     return bool(box.header["identity"][2:] == deployment.identity.lines()[2:])
 
 
 def of_its_copies(box: Box, deployment: Deployment) -> bool:
-    """Return whether this deployment consists of the files in the bundle of a black box."""
+    """Return whether this deployment consists of the files in the bundle of a black box.
+
+    A box of an older program, which does not name them, gives True.
+    """
     identity = deployment.identity
     carried = box.header.get("carried") or [identity.deployment, *identity.content]
     return bool(carried == [identity.deployment, *identity.content])
 
 
 def frames_of(box: Box) -> Iterator[TimedFrame]:
-    """Yield the frames that the daemon received, like those of a log."""
+    """Yield the frames that the daemon received, at ns since 1970; the channel is the bus."""
     buses = box.header["buses"]
     since_1970_ns = box.header["time_ns"] - box.header["clock_ns"]
     for segment in box.segments:
@@ -67,7 +70,9 @@ class Player:
         self._states = States(GatedController(controller), controller)
 
     def run(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
-        """Yield every tick, with all frames received and sent since the tick before.
+        """Yield every tick at ns since 1970, with all frames received and sent since the last one.
+
+        ``progress`` gets the part done, 0 to 1, after each segment.
 
         Raises:
             BoxError: the recording does not fit this program or deployment.
@@ -94,7 +99,7 @@ class Player:
 
 
 class _Played:
-    """A controller that receives the recorded calls of the daemon to its own controller."""
+    """Repeats the recorded calls of the daemon to its controller with a controller of its own."""
 
     def __init__(self, gated: GatedController, controller: Controller, buses: list[str]) -> None:
         self._gated, self._controller, self._buses = gated, controller, buses
@@ -139,7 +144,7 @@ class _Played:
         return None
 
     def _compare(self, ours: Frame) -> None:
-        """Compare a frame computed now with the recorded one."""
+        """Add a frame computed now to the result, and compare it with the recorded one."""
         result = self._result
         result.sent.append(ours)
         record = self._next_of(SENT)

@@ -56,7 +56,7 @@ _LATE = 0.8  # of the time axis: a later reason is aligned to the end of its sta
 
 
 def figure(replays: Sequence[Replayed]) -> Figure:
-    """Return the picture of all axes that move, of all replays.
+    """Return the picture of the axes that move in a replay; of the first axis if none does.
 
     Args:
         replays: at least one, with rows.
@@ -116,7 +116,7 @@ def _head(fig: Figure, replays: Sequence[Replayed], idle: Sequence[str], height:
 
 
 def _title(name: str, replays: Sequence[Replayed]) -> str:
-    """Return name and sway of an axis, below them its run-on: straight and of each deployment."""
+    """Return an axis' name and what is known of its sway and run-on, straight and replayed."""
     having = [one for one in replays if name in one.measures]
     texts = []
     for words, key, unit in _NUMBERS:
@@ -133,7 +133,7 @@ def _title(name: str, replays: Sequence[Replayed]) -> str:
 def _draw_command(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
-    """Draw the command of the valve on top of the joystick as a filled step."""
+    """Draw the joystick as a filled step, and on it the valve command of each replay."""
     if name in straight.axes:
         joystick, colour = straight.axes[name].joystick, style.JOYSTICK_COLOUR
         panel.fill_between(straight.t_s, joystick, step="post", color=colour, linewidth=0)
@@ -165,7 +165,7 @@ def _plot(panel: Axes, x: Sequence[float], y: Sequence[float], look: _Look, **op
 def _draw_lanes(
     panel: Axes, name: str, replays: Sequence[Replayed], shown_s: tuple[float, float]
 ) -> None:
-    """Draw one lane for each deployment: the states of the axis, and other events as marks."""
+    """Draw a lane for each replay: states of the axis, events as marks; reasons of the first."""
     first_s, last_s = shown_s
     late_s = first_s + _LATE * (last_s - first_s)
     for i, one in enumerate(replays):
@@ -196,7 +196,7 @@ def _draw_lanes(
 
 
 def _spans(one: Replayed, axis: str) -> Iterator[tuple[float, float, State, Reason]]:
-    """Yield begin and end (s), state and reason of an axis, from its first event on."""
+    """Yield (begin, end, state, reason) of an axis from its first event on; s since the start."""
     changes = [(_seconds(one, at), m[2], m[3]) for at, m in _matches(one) if m[1] == axis]
     end = (_seconds(one, one.trace.end_ns), "", "")
     for (start_s, state, reason), (end_s, *_) in pairwise([*changes, end]):

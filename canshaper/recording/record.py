@@ -59,7 +59,7 @@ def pack(
 
 
 def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
-    """Unpack a bundle into a folder; even a hostile one reads and writes nothing outside it.
+    """Unpack a bundle into an empty folder; even a hostile one touches nothing outside it.
 
     Returns:
         (log, deployment file).
@@ -124,7 +124,7 @@ def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> 
 
 
 def history_lines(history: History) -> list[str]:
-    """Return every change with its time, then the last counters."""
+    """Return a line for each change, with its time, then one for the last counters, if any came."""
     lines = [f"{time_text(event.time_ns)} {event.text}" for event in history.changes]
     if history.counted_ns is not None:
         counters = " ".join(f"{name}={count}" for name, count in history.counters.items())
@@ -138,7 +138,7 @@ def time_text(time_ns: int) -> str:
     return datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")
 
 
-# Longest part of the log that a power cut may lose, s.
+# Longest part of the log that a crash of the program may lose, s.
 FLUSH_S = 1.0
 
 
@@ -182,7 +182,7 @@ class Recording:
 
         Raises:
             BusError: a bus cannot be opened, or can no longer be read.
-            OSError: the log cannot be written; what was written stays.
+            OSError: the log cannot be written; what was written stays (MF4 is written at the end).
             UsageError: the extra for the format of the log is not installed.
         """
         listener = Listener(self._deployment.config.buses.items())
@@ -209,7 +209,7 @@ class Recording:
 def _opened(
     path: Path, deployment: Deployment
 ) -> Iterator[tuple[Callable[[ReceivedFrame], object], Callable[[], object]]]:
-    """Open a log; give a function that writes a frame, and one that flushes to the disk."""
+    """Open a log; give (function that writes a frame, function that hands all to the kernel)."""
     if path.suffix.lower() in EXTRAS:
         with exporting(path, deployment) as export:
             assert export is not None

@@ -31,7 +31,7 @@ class Verdict:
     Attributes:
         compared: number of compared frames.
         different: number of frames that differ.
-        examples: the first differences, with their times in ns.
+        examples: the first ``EXAMPLES`` differences: (time of the tick in ns, difference).
     """
 
     compared: int = 0
@@ -64,16 +64,17 @@ class Drive:
 
 
 def look(deployment: Deployment, path: Path, given: Mapping[str, str], *, own: bool) -> Drive:
-    """Look at the beginning of a log for its channels, and whether it is a black box.
+    """Find the channels in the first ``LOOKED_AT`` frames of a log; read a black box as a whole.
 
     Args:
         deployment: the machine.
         path: the log.
         given: channel by bus from the command line.
-        own: the deployment came with the log.
+        own: the deployment came with the log, in one bundle.
 
     Raises:
         LogError: the log cannot be used, or its channels are not those of the deployment.
+        OSError: a black box cannot be read.
     """
     if path.suffix == SUFFIX:
         try:
@@ -106,10 +107,10 @@ class Replay:
     Attributes:
         exact: the replay makes every call of the daemon and compares every frame.
         log: the log, for the counts of left-out frames.
-        received: number of received frames by message.
+        received: number of received frames by bus, id and whether the id is extended.
         verdict: result of the comparison with a black box.
         cut_off: why the log is cut off; empty if it is whole.
-        never_ready: axis that was never ready -> number of ticks of each of its reasons.
+        never_ready: ticks by reason of each axis that was never ready; empty if ``exact``.
     """
 
     def __init__(self, deployment: Deployment, drive: Drive) -> None:
@@ -158,7 +159,7 @@ class Replay:
             yield tick, result
 
     def check_joysticks(self) -> None:
-        """Check after the replay that the log had a joystick.
+        """Check after a replay that is not ``exact`` that the log had a joystick.
 
         Raises:
             LogError: the log has no frame of any joystick.
@@ -208,7 +209,7 @@ class Replay:
         yield from self.log.warnings()
 
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
-        """Yield the frames of the log that a daemon of the deployment would see."""
+        """Yield the frames of the log that a daemon would see; set ``cut_off`` if it is cut off."""
         channels, box = self._drive.channels, self._drive.box
         known: dict[MessageKey, tuple[str, Kind]] = {}
         new, ignored = new_frame, Kind.IGNORED

@@ -49,7 +49,7 @@ class Trace:
     Attributes:
         start_ns: time of the first tick; None before it.
         end_ns: time of the last tick.
-        full: the drive had more ticks than ``MOST_ROWS``; the rest was dropped.
+        full: more than ``MOST_ROWS`` rows were to be kept; the rest was dropped.
     """
 
     def __init__(self, deployment: Deployment, begin_s: float, end_s: float | None) -> None:
@@ -67,7 +67,7 @@ class Trace:
                 self._models[name] = SwayModel(sway.mode(), tick_s), sway.full_speed_m_s
 
     def add(self, tick: Tick, result: Result) -> None:
-        """Take a tick and its result."""
+        """Take a tick and its result; one not later than the row before gives no row."""
         if self.start_ns is None:
             self.start_ns = tick.now_ns
         self.end_ns = tick.now_ns
@@ -137,7 +137,7 @@ class Replayed:
     straight: dict[str, AxisMetrics] = field(default_factory=dict)
 
     def measure(self) -> None:
-        """Measure the drive, and the drive with the joystick straight to the valve."""
+        """Set ``measures`` and ``straight``, unless the trace has fewer than two rows."""
         if self.trace.rows < 2:
             return
         recording, straight = self.trace.recording(), self.trace.straight()
@@ -152,7 +152,7 @@ class Replayed:
         return sum(text.startswith(begin) for _, text in self.events)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+        """Return counts, measures by axis and result of the comparison as JSON types."""
         replay, verdict = self.replay, self.replay.verdict
         start_ns = self.trace.start_ns or 0
         return {
@@ -201,7 +201,7 @@ def print_replays(replays: Sequence[Replayed], console: Console) -> None:
 
 
 def verdict_lines(one: Replayed, *, examples: bool) -> Iterator[str]:
-    """Yield the result of the comparison with the log, and the first differences if wanted."""
+    """Yield lines on the comparison with a black box; nothing if no frame was compared."""
     verdict = one.replay.verdict
     if not verdict.compared:
         return
@@ -219,7 +219,7 @@ def _same(different: int) -> str:
 
 
 def _difference_text(deployment: Deployment, difference: Difference) -> str:
-    """Return a difference in the names and values of the DBC."""
+    """Return a difference as text, in names and values of the DBC where the frame has them."""
     bus, can_id, extended = difference.key
     messages = [
         m

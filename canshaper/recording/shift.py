@@ -37,7 +37,7 @@ MOST_TICKS = 15_000
 
 
 class LogOfWork(NamedTuple):
-    """A log before it is counted: machine, name for people, first frame, deployment and drive."""
+    """A log before it is counted: its machine, name for people and time of its first frame."""
 
     machine: str
     name: str
@@ -47,13 +47,13 @@ class LogOfWork(NamedTuple):
 
 
 def first_ns(drive: Drive) -> int:
-    """Return the time of a log's first frame, ns; raise LogError if the log cannot be read."""
+    """Return the time of a log's first frame, ns, or 0; raise LogError if it cannot be read."""
     frames = frames_of(drive.box) if drive.box else iter(LogFile(drive.path))
     return next((frame.time_ns for frame in frames), 0)
 
 
 def day_of(time_ns: int) -> str:
-    """Return the day of a time in a log, in UTC; empty if its clock has no date."""
+    """Return the day of a time in a log as YYYY-MM-DD in UTC; empty if its clock has no date."""
     if time_ns < FIRST_DAY_NS:
         return ""
     return datetime.fromtimestamp(time_ns / 1e9, UTC).date().isoformat()
@@ -83,13 +83,14 @@ class Shifts:
         ]
 
     def add(self, log: LogOfWork, progress: Callable[[float], None]) -> list[str]:
-        """Count a log; ticks that an earlier log of the same machine also has count once.
+        """Count a log, but not times with a date that an earlier log of the machine has too.
 
         Returns:
             Notes on the log to read before relying on its figures.
 
         Raises:
-            LogError: the log cannot be used; a log that is cut off is used up to its end.
+            LogError: the log cannot be used (what came before is counted), or has no joystick
+                frame; a log that is cut off is used up to its end.
         """
         replay, machine = Replay(log.deployment, log.drive), log.machine
         readers = _Readers(log.deployment)
@@ -122,7 +123,7 @@ class Shifts:
         return notes
 
     def _begin(self, log: LogOfWork, now_ns: int) -> None:
-        """Name the shift that a tick belongs to."""
+        """Set the machine's shift to that of a tick; one with a date ends its counted time."""
         machine, day = log.machine, day_of(now_ns)
         if self._by == "file" or not day:
             self._shift[machine] = log.name
@@ -136,7 +137,10 @@ class Shifts:
 
 
 class _Axis:
-    """Motion of one axis in a log, tick by tick; ``foreign``: another program drives the axis."""
+    """Motion of one axis in a log, tick by tick.
+
+    ``velocity`` is -1 to 1 of full speed; ``foreign``: another program drives the axis.
+    """
 
     def __init__(self, bound: BoundAxis, tick_s: float) -> None:
         config = bound.config
@@ -158,19 +162,19 @@ class _Axis:
         self._signal, self._lost_ns = SwaySignal(message, one), 1e9 * one.timing.lost_s
 
     def on_valve_frame(self, data: bytes, time_ns: int) -> None:
-        """Take a frame of the axis' valve from the log."""
+        """Take a frame of the axis' valve from the log; ignore a wrong one."""
         layout, valve = self.bound.valve.message.fields.layout, self.bound.valve
         if len(data) == layout.length and (steps := valve.read(layout.decode(data))) is not None:
             self._logged, self.valve_ns = self._limits.velocity(steps / valve.steps), time_ns
 
     def on_status(self, data: bytes, time_ns: int) -> None:
-        """Take a frame of the axis' status from the log."""
+        """Take a frame of the axis' status from the log; ignore a wrong one."""
         values = self.bound.status.decode(data) if self.bound.status else None
         if values and values["State"] in {*State}:
             self._status, self._status_ns = State(values["State"]), time_ns
 
     def step(self, row: Row, now_ns: int, ticks: int) -> None:
-        """Advance by this number of ticks to the replay's row of the last one."""
+        """Advance by ``ticks`` to ``now_ns``, at which the replay of the axis gave ``row``."""
         self.velocity, self.state, self.foreign = row.applied, row.state, False
         if self.valve_ns >= 0:  # a silent valve closes by itself
             silent = now_ns - self.valve_ns > 1_000_000 * self.bound.config.valve.timeout_ms
@@ -224,7 +228,7 @@ class _Crane:
         self._profiles = next(((name, names) for name, names in profiles if names), None)
 
     def part(self, rows: Mapping[str, Row]) -> tuple[str, str, str]:
-        """Return crane, profile and anti-sway of this tick."""
+        """Return (crane, profile, "on" or "off") of a tick: anti-sway of the last motion, or ""."""
         if moving := [one for one in self._swinging.values() if one.velocity]:
             off = any(one.foreign or one.state is State.BYPASS_ON for one in moving)
             self._anti_sway = "off" if off else "on"
@@ -232,7 +236,7 @@ class _Crane:
         return self._name, names[rows[axis].active_set] if axis else "", self._anti_sway
 
     def count(self, figures: Figures, rows: Mapping[str, Row], seconds: float) -> None:
-        """Count a tick of this many seconds."""
+        """Add a tick of this many seconds to ``figures``."""
         joysticks, swings = {}, {}
         for name, one in self._axes.items():
             command = rows[name].command
@@ -285,7 +289,7 @@ class _Readers:
                 axes[motion.config.slew].radius = position.read(radius)
 
     def end(self) -> None:
-        """End the pauses of all cranes."""
+        """End the pauses of all cranes, and add their waiting times."""
         for crane in self.cranes:
             crane.counter.end()
 

@@ -52,13 +52,13 @@ Known = tuple[str, int, bool, int | None] | str
 
 
 def is_log(header: str) -> bool:
-    """Return whether this first line of a table is that of a log of frames, or nearly one."""
+    """Return whether a first line is that of a log of frames, even if it lacks a column."""
     of_kvaser = header.strip().startswith(("CSV CAN data", "Kvaser Memorator Log"))
     return of_kvaser or "arbitration_id" in header or Table.of(header) is not None
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a file is a table of numbers rather than a log of CAN frames.
+    """Return whether a .csv, .tsv or .txt file is a table of numbers, no log of CAN frames.
 
     Raises:
         OSError: it cannot be read.
@@ -70,7 +70,7 @@ def is_table(path: Path) -> bool:
 
 
 def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """Yield the frames of a table; its header may stand below other lines."""
+    """Yield the data frames of a table; its header may stand below up to 29 other lines."""
     rows, bases = lines(file, place), {}
     first = header = next(rows, b"").decode("utf-8", "replace").strip()
     while (table := Table.of(header)) is None:
@@ -116,7 +116,7 @@ class Table:
 
     @classmethod
     def of(cls, header: str) -> "Table | None":
-        """Return the table under a header; None if its rows are no frames."""
+        """Return the table under a header; None if it names no time, no id or no data."""
         delimiter = next((one for one in ";\t," if one in header), ",")
         at: dict[str, int] = {}
         cells = False
@@ -167,7 +167,7 @@ class Table:
             yield frame
 
     def _kind(self, cells: Sequence[str], place: Place) -> Known:
-        """Return channel, id, extended and length of a row; or the kind of a left-out row."""
+        """Return (channel, id, extended, length or None) of a row; or why the row is left out."""
         row = {name: cells[at].strip().lower() for name, at in self._at.items()}
         flags = int(row.get("flags") or "0")
         for name, bit in (("error", _ERROR), ("remote", _REMOTE)):
@@ -235,7 +235,7 @@ class LogWriter:
 
     Args:
         file: the open log.
-        channel_of: channel by bus.
+        channel_of: channel by bus; an empty one becomes the name of the bus.
         fd: messages of CAN FD; a frame longer than a classical one is also written as CAN FD.
     """
 
@@ -248,7 +248,7 @@ class LogWriter:
         self._last_ns = 0
 
     def write(self, tick: Tick, result: Result) -> None:
-        """Write one tick; frames of ``others`` get the time of the line before."""
+        """Write a tick but its ``logged``; its ``others`` get the time of the line before."""
         for time_ns, frame in tick.received:
             self._line(time_ns, frame)
         for frame in tick.others:

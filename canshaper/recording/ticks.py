@@ -28,7 +28,7 @@ STATE_CHANGE = re.compile(r"axis=(\S+) state=(\S+) .*?reason=(\S+)")
 
 @dataclass(slots=True)
 class Tick:
-    """One tick.
+    """One tick; times are those of the log.
 
     Attributes:
         number: number of its deadline, from 0.
@@ -49,8 +49,8 @@ class Row(NamedTuple):
     """One axis after a tick.
 
     The row has the demand ``command`` and the sent velocity ``applied``, [-1, 1]; the predicted
-    sway, degrees; the part ``added`` to the velocity by a motion of two axes, which makes no swing;
-    state, number of the parameter set, and its sway mode.
+    sway, 0.0 without a model; the part ``added`` to the velocity by a motion of two axes, which
+    makes no swing; state, number of the parameter set, and its sway mode, None without a model.
     """
 
     command: float
@@ -67,7 +67,7 @@ new_row = tuple.__new__  # Row(...) in half the time
 
 @dataclass(slots=True)
 class Difference:
-    """A frame that differs from the recorded one; None for a frame that is missing."""
+    """Data of a frame in the replay and in the recording that differ; None where it is missing."""
 
     key: MessageKey
     ours: bytes | None
@@ -118,10 +118,10 @@ def _row_of(controller: Controller, control: AxisControl) -> Callable[[], Row]:
 
 
 def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
-    """Yield the ticks of a clock, from half a tick after the first received frame to the last.
+    """Yield the ticks of a clock, from half a tick after the first received frame to the last one.
 
-    Frames of the kind that the daemon sends go into ``logged``. In a pause longer than ``PAUSE_NS``
-    the ticks after that time are left out, except the last ones before the next frame.
+    Frames before that first one are dropped; those of the kind that the daemon sends go into
+    ``logged``. In a pause the ticks from 12 s after a frame to 1 s before the next are left out.
     """
     tick: Tick | None = None
     for time_ns, frame, kind in frames:
@@ -153,7 +153,8 @@ class LogPort:
         stamped: names of the buses whose frames carry the time of their arrival.
 
     Attributes:
-        arrived_ns: arrival of the frame that ``frames`` yielded last.
+        arrived_ns: arrival of the frame that ``frames`` yielded last; for a bus that is not
+            ``stamped``, the time of the last cycle.
         sent: frames sent since the tick began.
     """
 
@@ -184,7 +185,7 @@ class LogPort:
         return iter(waiting)
 
     def send(self, frame: Frame) -> bool:
-        """Keep a sent frame."""
+        """Keep a sent frame; return True."""
         self.sent.append(frame)
         return True
 
@@ -208,7 +209,7 @@ class Stepper:
         self._rows = rows_of(controller)
 
     def step(self, tick: Tick) -> Result:
-        """Give the frames of a tick to the controller, run it, and return what it sends."""
+        """Run a tick with its frames; return what is sent, before tick 0 also neutral frames."""
         controller, port = self._controller, self._port
         first = self._gated.neutral_frames() if tick.number == 0 else []
         port.begin(tick, self._standstill.last_ns)

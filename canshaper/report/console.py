@@ -92,7 +92,7 @@ class OnProgress(Protocol):
     """A function called with the part done, and with the name of the next step when it changes."""
 
     def __call__(self, done: float, what: str | None = None) -> None:
-        """Show the progress."""
+        """Show that ``done`` of the bar's total is done."""
 
 
 @contextmanager
@@ -211,7 +211,7 @@ def _pair_cell(axis: Mapping[str, Any], key: str, scale: float, digits: int, arr
 
 
 def _cross_line(name: str, axis: Mapping[str, Any], arrow: str) -> Text | None:
-    """Return a line on the residual sway in the other plane; None if it is negligible."""
+    """Return a line on residual sway in the other plane; None below ``MIN_RAW_DEG`` in both."""
     raw, shaped = axis["raw"]["cross_residual_deg"], axis["shaped"]["cross_residual_deg"]
     if max(raw or 0.0, shaped or 0.0) < MIN_RAW_DEG:
         return None
@@ -242,7 +242,7 @@ def change_text(reduction_pct: float) -> str:
 
 
 def _change(reduction_pct: float) -> tuple[str, str]:
-    """Return the change as text, and the style of its colour: green for less, red for more."""
+    """Return the change as text, and its style: red for more, else green."""
     return change_text(reduction_pct), "bold red" if round(-reduction_pct) > 0 else "bold green"
 
 

@@ -55,7 +55,7 @@ def document(
         facts: (name, value) of each fact about the report, in order.
         parts: results of ``text``, ``table`` and ``picture``, in order.
         first: such parts before the facts.
-        signed: leave room for a signature.
+        signed: leave room for name, date and signature.
     """
     rows = "".join(f"<tr><th>{_safe(k)}</th><td>{_safe(v)}</td></tr>" for k, v in facts)
     lines = "".join("<td></td>" for _ in _SIGNATURES)
@@ -76,7 +76,7 @@ def document(
 
 
 def facts(deployment: "Deployment | None", date: datetime) -> list[tuple[str, str]]:
-    """Return the facts of a report: date, machine, program, and the deployment with its hashes."""
+    """Return (name, value) of date, host, program, and the deployment, if given, with hashes."""
     rows = [
         ("date", f"{date:%Y-%m-%d %H:%M %Z}"),
         ("machine", socket.gethostname()),
@@ -89,7 +89,7 @@ def facts(deployment: "Deployment | None", date: datetime) -> list[tuple[str, st
 
 
 def verdict(line: str) -> str:
-    """Return the result in one sentence as HTML."""
+    """Return the result of the verb, a sentence, as HTML in a frame."""
     return f'<p class="verdict">{_safe(line)}</p>'
 
 
@@ -99,7 +99,7 @@ def heading(line: str) -> str:
 
 
 def listing(lines: str) -> str:
-    """Return lines of a file as HTML."""
+    """Return lines of a file as HTML that keeps their spaces."""
     return f"<pre>{_safe(lines)}</pre>"
 
 

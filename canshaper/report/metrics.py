@@ -48,8 +48,9 @@ class AxisMetrics:
 
     Attributes:
         still_s: from the release until |sway| in the plane of the axis stays below the bound of a
-            still grapple. Longest over the strokes of this axis alone.
-        swings_on: ``still_s`` is a lower bound: the rest ended with more swing.
+            still grapple. Largest over the strokes of this axis alone; of their lower bounds, if
+            there are any.
+        swings_on: ``still_s`` is a lower bound: the rest ended with more swing, or too soon after.
         peak_deg: largest |sway| in the plane of the axis over the whole drive, degrees.
         rms_deg: square root of the time mean of sway^2 over the whole drive (trapezoids, so a
             lost sample gets no extra weight), degrees.
@@ -91,8 +92,8 @@ class AxisMetrics:
 class AxisComparison:
     """Measures of one axis in both drives; reductions are 100 (1 - shaped / raw) percent.
 
-    A reduction is None for an axis without sway, if either measure is None, and if the raw swing
-    stays below ``MIN_RAW_DEG``. It is negative if shaping made the swing larger.
+    A reduction is None without both measures, for a raw one below ``MIN_RAW_DEG``, and for a raw
+    drive that swings above the horizontal; it is negative if shaping made the swing larger.
     """
 
     raw: AxisMetrics
@@ -133,7 +134,7 @@ def report_dict(
 ) -> dict[str, Any]:
     """Return the comparison as a dictionary ready for JSON.
 
-    ``crane`` (None for a drive without the place of the tip) and each axis have the reductions, and
+    ``crane`` (None if a drive has none) and each axis, under ``axes``, have the reductions, and
     all measures of both drives under ``raw`` and ``shaped``; each axis also has ``time_to_95_s``
     and ``run_on_s`` of the shaped drive. Degrees and seconds are rounded to 0.01, percent to 0.1,
     metres and fractions to 0.001. A value that is missing or not finite is None.
@@ -221,7 +222,7 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def swings_over(recording: Recording) -> bool:
-    """Return whether the grapple swings above the horizontal, where a real one falls over."""
+    """Return whether the grapple swings beyond 90 degrees, where a real one falls over."""
     if recording.crane:
         return (crane_metrics(recording, recording.crane).peak_deg or 0.0) > HORIZONTAL_DEG
     swings = (sway for trace in recording.axes.values() for sway in trace.sway_deg or ())
@@ -229,7 +230,7 @@ def swings_over(recording: Recording) -> bool:
 
 
 def _reduction_of(raw: Recording) -> Callable[[float | None, float | None], float | None]:
-    """Return the function that computes a reduction against this drive: None if it swings over."""
+    """Return a function of two measures to the reduction, %; always None if ``raw`` swings over."""
     return (lambda _raw, _shaped: None) if swings_over(raw) else _reduction_pct
 
 

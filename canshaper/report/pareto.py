@@ -23,7 +23,7 @@ _ASIDE_PX = tuple(float(sign * px) for px in (24, 90, 170, 260) for sign in (1, 
 
 @dataclass(frozen=True)
 class Point:
-    """A filter: time to stop after release, time to 95 % speed, and its worst residual swing."""
+    """A filter: whether it is ours, time to stop, time to 95 % speed, worst residual swing."""
 
     name: str
     ours: bool
@@ -38,7 +38,7 @@ class Limits:
 
     Attributes:
         curve: (time to stop in s, least worst residual in degrees) of any non-negative impulse
-            response within the valve's rate, on one axis alone.
+            response within the valve's rate, on one axis alone; at least two points, or empty.
         time_optimal_s: shortest time in which any command can stop the swing.
     """
 
@@ -47,7 +47,7 @@ class Limits:
 
 
 def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
-    """Return the picture: run-on above, rise time below, with the names next to the dots."""
+    """Return the picture of at least one filter: swing over run-on, below it over rise time."""
     drawn = style.new_figure(
         style.WIDTH_PX, _HEIGHT_PX, dpi=style.PRINT_DPI, layout=ConstrainedLayoutEngine(rect=_RECT)
     )
@@ -117,7 +117,7 @@ def _limits(axes: Axes, limits: Limits) -> None:
 
 
 def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> None:
-    """Draw dots with names; a name covers no dot, line or other name, and its line crosses none."""
+    """Draw dots with names; where there is room, names and lines to dots cover nothing else."""
     spots = [(s, p.worst_deg) for s, p in zip(seconds, points, strict=True)]
     places = [tuple(axes.transData.transform(spot)) for spot in spots]
     half = 0.5 * _DOT_PX
@@ -174,7 +174,7 @@ class _Try:
         self.line = [Bbox.from_bounds(x + dx * k / 20, y + dy * k / 20, 3.0, 3.0) for k in parts]
 
     def is_free(self, used: list[Bbox], others: list[Bbox], lines: list[Bbox]) -> bool:
-        """Return whether the name covers no used box or line, and its line crosses no other box."""
+        """Return whether the name is clear of ``used`` and ``lines``, its line of ``others``."""
         if any(self.box.overlaps(one) for one in (*used, *lines)):
             return False
         return not any(piece.overlaps(one) for piece in self.line for one in others)

@@ -1,7 +1,7 @@
 """The picture of a raw and a shaped drive: joystick, command to the valve, swing of the grapple.
 
-Of the report only this module and those it draws with need matplotlib. It uses matplotlib's object
-API: no display and no global state.
+Of the report only the pictures (this module, ``pareto``, ``style``) need matplotlib. They use its
+object API: no display and no global state.
 """
 
 from collections.abc import Callable, Mapping
@@ -102,7 +102,7 @@ def _draw_blocks(
 def finding(name: str, axis: Mapping[str, Any]) -> str:
     """Return the result for one axis as text: "Near-far: residual swing 15.9° → 0.4° (−97 %)".
 
-    Without a residual the text has the peak. Swing in the other plane is added if there is any.
+    Without a raw residual the text has the peak. Swing in the other plane needs its reduction.
     """
     measure = "residual" if axis["raw"]["residual_deg"] is not None else "peak"
     words = {"residual": "residual swing", "peak": "largest swing"}
@@ -128,7 +128,7 @@ def _windows(drive: Recording) -> list[range]:
 
 
 def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
-    """Write the headline, also the key to the curves, with gain and price of the filters."""
+    """Write the headline, also the key to the curves; gain and price where the tip is measured."""
     words = (
         ("The same operator script with", style.TEXT_COLOUR),
         ("filters off (dashed)", style.RAW_COLOUR),
@@ -142,7 +142,7 @@ def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
 
 
 def gain_and_price(crane: Mapping[str, Any]) -> str:
-    """Return gain (swing left) and price (run-on) of the filters, whatever axes moved."""
+    """Return lines on gain (residual swing, else peak) and price (run-on) of the filters."""
     off, on = crane["raw"], crane["shaped"]
     measure, words = "residual", "residual swing"
     if off["residual_deg"] is None:
@@ -254,7 +254,7 @@ def _mark_residual(
 
 
 def _worst(drive: Recording, name: str) -> int:
-    """Return the sample of a drive's residual, or of its peak if it has no residual window."""
+    """Return the index of the residual's sample, or of the peak's without a residual window."""
     windows = residual_windows(drive, find_strokes(drive)[name])
     seen = [k for window in windows for k in window] or range(len(drive.t_s))
     return max(seen, key=lambda k: abs(_sway(drive, name)[k]))

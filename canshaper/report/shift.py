@@ -37,7 +37,11 @@ FIGURES = {
 
 @dataclass
 class Figures:
-    """Sums over a part of the work; ``FIGURES`` defines each number."""
+    """Sums over a part of the work, as ``FIGURES`` defines them.
+
+    ``cycle_peaks_deg`` has the largest swing of each cycle; ``measured_s`` is the driven time in
+    which a sway sensor shows the swing.
+    """
 
     logged_s: float = 0.0
     driven_s: float = 0.0
@@ -61,7 +65,7 @@ class Figures:
 
 
 class WorkCounter:
-    """Counts the work of one crane in a few numbers, whatever the length of the log.
+    """Counts the work of one crane tick by tick, into the figures of a row.
 
     Args:
         cycle_axis: the axis whose ways there and back count as cycles; empty for none.
@@ -88,7 +92,8 @@ class WorkCounter:
         """Add a tick of ``seconds`` to the figures of its row.
 
         Each joystick value is 0 within its neutral band; each speed is that of the tip by one axis
-        with sway. ``moving``: a valve has a command; ``measured``: a sensor measures the swing.
+        with sway; ``sway_deg`` is the total swing. ``moving``: a valve has a command; ``measured``:
+        a sensor measures the swing.
         """
         self._now_s += seconds
         deflected = any(joysticks.values())
@@ -115,7 +120,7 @@ class WorkCounter:
             self._cycle_peak_deg = sway_deg
 
     def end(self) -> None:
-        """End a pause and add its waiting time to its figures."""
+        """End the pause, if there is one; add its waiting time to the figures in which it began."""
         if self._pause:
             self._pause.waiting_s += self._swung_s
         self._pause, self._pause_s, self._swung_s = None, 0.0, 0.0
@@ -149,7 +154,7 @@ class _Strokes:
         self._since_s = self._ended_s = 0.0
 
     def step(self, figures: Figures, joystick: float, now_s: float) -> None:
-        """Take the joystick's deflection in a tick, 0 in neutral."""
+        """Take the joystick's deflection in a tick, 0 in neutral; add to ``figures``."""
         side = (joystick > 0.0) - (joystick < 0.0)
         if side == self._side:
             return

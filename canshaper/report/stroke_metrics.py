@@ -34,7 +34,10 @@ def _crossing_s(t_s: list[float], values: Mapping[int, float], k: int, level: fl
 
 
 def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | None:
-    """Return the time in s from the press to 95 % of the demanded speed; None if never reached."""
+    """Return the time in s from the press to 95 % of the demanded speed, with the joystick held.
+
+    If the speed falls below 90 % again, only a later time counts; None if there is none.
+    """
     held = range(stroke.press, stroke.plateau[1] + 1)
     speed = {k: stroke.direction * trace.speed[k] for k in held}
     lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
@@ -49,20 +52,22 @@ def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | 
 
 
 def run_on_s(t_s: list[float], speed: Sequence[float], rest: range) -> float:
-    """Return the time in s from the start of a rest until |speed| stays below 5 % of full speed."""
+    """Return the time in s of a rest until |speed| stays below 5 % of full, or all of its time."""
     return _until_below_s(t_s, speed, rest, STOPPED)
 
 
 def still_after(
     t_s: list[float], sway_deg: Sequence[float], rests: Iterable[range], still_deg: float
 ) -> tuple[float | None, bool | None]:
-    """Return the longest time from a release until the swing stays below a bound.
+    """Return the largest time from a release until the swing stays below a bound.
+
+    A time that is only a lower bound counts as larger than any other.
 
     Args:
         t_s: times of the samples.
         sway_deg: swing, degrees; the bound applies to its absolute value.
         rests: samples of each rest, from the release on.
-        still_deg: the bound.
+        still_deg: the bound, degrees.
 
     Returns:
         The time in s, and whether it is a lower bound: the rest ended with more swing, or too soon
@@ -89,12 +94,15 @@ def _until_below_s(t_s: list[float], values: Sequence[float], rest: range, level
 
 
 def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
-    """Return the travel after the release, in seconds of full speed."""
+    """Return the travel after the release, forward in the stroke, in seconds of full speed."""
     return stroke.direction * integral(t_s, trace.speed, stroke.rest)
 
 
 def dip(trace: AxisTrace, stroke: Stroke) -> float:
-    """Return the fall of the output while the joystick is held, fraction of full command."""
+    """Return the largest fall of the output below its maximum while the joystick is held.
+
+    The fall of the joystick itself is taken off; fraction of full command.
+    """
     first, last = stroke.plateau
     sent_max, command_max, dip = -math.inf, 0.0, 0.0
     for k in range(stroke.press, last + 1):
@@ -106,7 +114,7 @@ def dip(trace: AxisTrace, stroke: Stroke) -> float:
 
 
 def re_rise(trace: AxisTrace, stroke: Stroke) -> float:
-    """Return the rise of the output after the release, fraction of full command."""
+    """Return the largest rise of |output| in the rest, fraction of full command."""
     lowest, rise = math.inf, 0.0
     for k in stroke.rest:
         sent = abs(trace.sent[k])
@@ -122,9 +130,9 @@ class CraneMetrics:
     A rest is the time from the release of the last joystick until any joystick is pressed.
 
     Attributes:
-        still_s: longest time from a release until the total swing stays below the bound of a still
-            grapple.
-        swings_on: ``still_s`` is a lower bound: the rest ended with more swing.
+        still_s: time from a release until the total swing stays below the bound of a still grapple;
+            the largest, of the lower bounds if there are any.
+        swings_on: ``still_s`` is a lower bound: the rest ended with more swing, or too soon after.
         peak_deg: largest total swing of the grapple over the whole drive, degrees.
         rms_deg: root mean square over time of the total swing, degrees.
         residual_deg: largest total swing in the rests, later than ``dwell_s`` after the release,

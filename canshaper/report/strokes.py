@@ -27,7 +27,7 @@ class Stroke:
         level: demanded speed, median of |joystick| over the plateau, fraction of full speed.
         plateau: first and last sample of the longest run of |joystick| above ``PLATEAU`` of the
             largest deflection of the stroke.
-        alone: no other joystick left neutral between press and release.
+        alone: every other joystick is in neutral from press to release.
         rest: samples from the release until any joystick is pressed, or another joystick is
             released; empty for a reversal and for a stroke without release.
     """
@@ -43,7 +43,7 @@ class Stroke:
 
 
 def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
-    """Segment every joystick of the drive into strokes, in order of time.
+    """Return the strokes of every joystick of the drive by axis, in order of time.
 
     Raises:
         ValueError: the lists differ in length, time does not increase, or a value is no number.
@@ -68,7 +68,7 @@ def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]
 
 
 def residual_window(t_s: list[float], rest: range, dwell_s: float) -> range:
-    """Return the part of a rest that shows residual swing; empty if the rest is too short."""
+    """Return a rest from ``dwell_s`` on; empty if that lasts under ``RESIDUAL_WINDOW_MIN_S``."""
     begin_s = t_s[rest.start] + dwell_s - _ROUNDING_S
     start = next((k for k in rest if t_s[k] >= begin_s), rest.stop)
     window = range(start, rest.stop)

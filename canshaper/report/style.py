@@ -73,7 +73,7 @@ def titled(panel: Axes, text: str, size: float) -> None:
 
 
 def label(panel: Axes, x: str = "", y: str = "") -> None:
-    """Write the names of a panel's x and y axis."""
+    """Write the names of a panel's x and y axis; leave one alone whose name is empty."""
     for text, put in ((x, panel.set_xlabel), (y, panel.set_ylabel)):
         if text:
             put(text, fontsize=TEXT_PT, color=TEXT_COLOUR)
@@ -90,7 +90,7 @@ def zero_line(panel: Axes) -> None:
 
 
 def command_scale(panel: Axes, limit: float) -> None:
-    """Scale the y axis for commands: -100 to 100 %, with room up to ``limit`` of full command."""
+    """Scale the y axis to +-``limit`` of full command, with ticks at -100, 0 and 100 percent."""
     panel.set_ylim(-limit, limit)
     panel.set_yticks([-1.0, 0.0, 1.0], [f"{MINUS}100", "0", "100"])
 
@@ -98,7 +98,10 @@ def command_scale(panel: Axes, limit: float) -> None:
 def coloured_words(
     fig: Figure, words: Sequence[tuple[str, str]], at: tuple[float, float], *, size: float, sep: int
 ) -> None:
-    """Write a line of (text, colour) as the key to curves, with its upper left corner at ``at``."""
+    """Write a line of (text, colour) as the key to curves.
+
+    ``at`` is its upper left corner, fractions of the figure; ``size`` and ``sep`` are points.
+    """
     parts: list[Artist] = [
         TextArea(text, textprops={"color": colour, "fontsize": size, "weight": "bold"})
         for text, colour in words
@@ -175,7 +178,7 @@ def _columns(points: Sequence[Point]) -> tuple[list[float], list[float]]:
 
 
 def _square(points: Sequence[Point]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the limits of x and y of a square that holds all points."""
+    """Return (lowest, highest) x and y of a square around all points, with a margin."""
     columns = _columns(points)
     low, high = [min(c) for c in columns], [max(c) for c in columns]
     half = (0.5 + _MARGIN) * max(b - a for a, b in zip(low, high, strict=True))

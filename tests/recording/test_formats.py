@@ -201,6 +201,17 @@ def test_asc_with_times_from_line_to_line(tmp_path: Path) -> None:
     assert [f.time_ns for f in frames] == [100_000_000, 350_000_000, 350_001_000]
 
 
+def test_asc_of_two_headers_takes_the_times_that_the_second_names(tmp_path: Path) -> None:
+    content = """base hex  timestamps relative
+   0.100000 1  110             Rx   d 1 0A
+base hex  timestamps absolute
+   0.300000 1  110             Rx   d 1 0B
+   0.500000 1  110             Rx   d 1 0C
+"""
+    frames = list(LogFile(kept(tmp_path, "a.asc", content)))
+    assert [f.time_ns for f in frames] == [100_000_000, 300_000_000, 500_000_000]
+
+
 def test_a_remote_frame_on_a_channel_of_fd(tmp_path: Path) -> None:
     content = """base hex  timestamps absolute
    1.0 CANFD   3 Tx     50005x      0 1 5 0 140000 73 200050 7a60 46500250
