@@ -26,7 +26,7 @@ from canshaper.report.shift import Figures, WorkCounter
 from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.states import State
 from canshaper.shaping.sway import SwayModel
-from canshaper_sim.cranes import cranes
+from canshaper_sim.cranes import axes_of, cranes
 
 # The clock of a log that begins before this counts from its own start.
 FIRST_DAY_NS = 1_000_000_000 * 1_000_000_000
@@ -96,26 +96,28 @@ class Shifts:
         readers = _Readers(log.deployment)
         dated, last_ns, skipped = day_of(log.start_ns), 0, 0
         before_ns = self._end_ns.get(machine, 0) if dated else 0
-        for tick, result in replay.run(progress):
-            now_ns = tick.now_ns
-            elapsed_ns = now_ns - last_ns if last_ns else readers.tick_ns
-            last_ns = now_ns
-            for time_ns, frame in (*tick.logged, *tick.received):
-                for read in readers.of.get(frame[:3], ()):
-                    read(frame.data, time_ns)
-            for name, axis in readers.axes.items():
-                axis.step(result.rows[name], now_ns, elapsed_ns // readers.tick_ns)
-            if now_ns <= before_ns:
-                skipped += 1
-                continue
-            self._begin(log, now_ns)
-            if elapsed_ns > self._gap_ns:
-                elapsed_ns = readers.tick_ns
-                readers.end()
-            for crane in readers.cranes:
-                key = (machine, self._shift[machine], *crane.part(result.rows))
-                crane.count(self._figures[key], result.rows, elapsed_ns / 1e9)
-        readers.end()
+        try:
+            for tick, result in replay.run(progress):
+                now_ns = tick.now_ns
+                elapsed_ns = now_ns - last_ns if last_ns else readers.tick_ns
+                last_ns = now_ns
+                for time_ns, frame in (*tick.logged, *tick.received):
+                    for read in readers.of.get(frame[:3], ()):
+                        read(frame.data, time_ns)
+                for name, axis in readers.axes.items():
+                    axis.step(result.rows[name], now_ns, elapsed_ns // readers.tick_ns)
+                if now_ns <= before_ns:
+                    skipped += 1
+                    continue
+                self._begin(log, now_ns)
+                if elapsed_ns > self._gap_ns:
+                    elapsed_ns = readers.tick_ns
+                    readers.end()
+                for crane in readers.cranes:
+                    key = (machine, self._shift[machine], *crane.part(result.rows))
+                    crane.count(self._figures[key], result.rows, elapsed_ns / 1e9)
+        finally:
+            readers.end()
         replay.check_joysticks()
         notes = [*replay.warnings(), *(() if replay.exact else readers.notes())]
         if skipped:
@@ -262,13 +264,10 @@ class _Readers:
     def __init__(self, deployment: Deployment) -> None:
         self.tick_ns = 1_000_000 * deployment.config.tick_ms
         axes = {n: _Axis(one, self.tick_ns / 1e9) for n, one in deployment.axes.items()}
-        self.axes, self.of = (
-            axes,
-            defaultdict[MessageKey, list[Callable[[bytes, int], object]]](list),
-        )
-        self.cranes = []
+        self.axes, self.cranes = axes, list[_Crane]()
+        self.of = defaultdict[MessageKey, list[Callable[[bytes, int], object]]](list)
         for crane in cranes(deployment) or [""]:
-            own = {n: one for n, one in axes.items() if not crane or n.startswith(f"{crane}_")}
+            own = {n: axes[n] for n in axes_of(deployment, crane)} if crane else axes
             self.cranes.append(_Crane(crane, own, deployment.config.still_deg))
         sensors: dict[MessageKey, SwaySensorInput] = {}
         for axis in axes.values():

@@ -23,6 +23,13 @@ def cranes(deployment: Deployment) -> list[str]:
     return list(names)
 
 
+def axes_of(deployment: Deployment, crane: str) -> list[str]:
+    """Return the names of a crane's axes, less those of a crane whose name begins with its own."""
+    others = tuple(f"{one}_" for one in cranes(deployment) if one.startswith(f"{crane}_"))
+    begins = f"{crane}_"
+    return [n for n in deployment.axes if n.startswith(begins) and not n.startswith(others)]
+
+
 def one_crane(deployment: Deployment, crane: str) -> Deployment:
     """Return the deployment of one crane: ``front_slew`` of the crane ``front`` becomes ``slew``.
 
@@ -35,12 +42,8 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
     if crane not in names:
         expected = f"one of {', '.join(names)}" if names else "none, there is one"
         raise DesignError(f"crane: expected {expected}, got {crane!r}")
-    # A crane whose name begins with this one's has axes of its own.
-    others = tuple(f"{one}_" for one in names if one.startswith(f"{crane}_"))
     axes: dict[str, BoundAxis] = {
-        name.removeprefix(f"{crane}_"): axis
-        for name, axis in deployment.axes.items()
-        if name.startswith(f"{crane}_") and not name.startswith(others)
+        name.removeprefix(f"{crane}_"): deployment.axes[name] for name in axes_of(deployment, crane)
     }
     moving = {axis.config.command.joystick for axis in axes.values()}
     # And those whose switches enable them.

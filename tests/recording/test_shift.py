@@ -4,6 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.cli.common import loader
+from canshaper.errors import LogError
+from canshaper.recording.replay import look
+from canshaper.recording.shift import LogOfWork, Shifts, first_ns
 from canshaper.report.shift import FIGURES, Figures, WorkCounter
 from tests.controller.test_profiles import BUTTON, FAST, SLEW
 from tests.recording.shift_logs import (
@@ -151,6 +155,21 @@ def test_where_the_status_ends_canshaper_does_not_drive(tmp_path: Path) -> None:
     assert [row["anti_sway"] for row in rows] == ["on", "off"]
 
 
+def test_a_log_that_cannot_be_used_to_its_end_counts_with_its_last_pause(tmp_path: Path) -> None:
+    """Its figures stay in the table."""
+    (whole,), _ = counted(path := written(tmp_path / "a.log", OUT))
+    shifts, deployment = Shifts("gap", HOUR_S), loader("forwarder.yaml")()
+    drive = look(deployment, path, {}, own=False)
+    one = LogOfWork("", path.name, first_ns(drive), deployment, drive)
+    with path.open("a", encoding="ascii") as log:
+        log.write("nonsense\n")
+    with pytest.raises(LogError, match="nonsense"):
+        shifts.add(one, print)
+    (row,) = shifts.rows()
+    assert whole["waiting_s"] > 3.0
+    assert row["waiting_s"] == pytest.approx(whole["waiting_s"], abs=0.021)  # less a tick
+
+
 def test_what_two_logs_have_counts_once(tmp_path: Path) -> None:
     whole = written(tmp_path / "a.log", OUT)
     again = tmp_path / "b.log"
@@ -162,12 +181,14 @@ def test_what_two_logs_have_counts_once(tmp_path: Path) -> None:
     assert any("s are in a log before it too" in note for note in notes)
 
 
-def test_each_crane_has_its_rows(tmp_path: Path) -> None:
+@pytest.mark.parametrize("second", ["rear", "front_left"])
+def test_each_crane_has_its_rows(tmp_path: Path, second: str) -> None:
     rear = [line.replace(" vcan0 ", " vcan1 ") for line in lines([*OUT, *BACK])]
     path = tmp_path / "a.log"
     path.write_text("".join(sorted([*lines(SHORT), *rear])))
-    rows, _ = counted(path, file="two-cranes.yaml")
-    assert [(row["crane"], row["cycles"]) for row in rows] == [("front", 0), ("rear", 1)]
+    file = machine_file(tmp_path, "two-cranes", ("rear_", f"{second}_"))
+    rows, _ = counted(path, file=str(file))
+    assert [(row["crane"], row["cycles"]) for row in rows] == [("front", 0), (second, 1)]
     assert [row["way_m"] for row in rows] == pytest.approx(
         [0.5 * tip_m_s(80, "slew"), 6.0 * tip_m_s(80, "slew")], abs=0.05
     )
