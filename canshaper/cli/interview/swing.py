@@ -44,7 +44,8 @@ _FASTEST_M_S = 40.0
 def swing_of(axis: str, period_s: float) -> Stopwatch | None:
     """Ask about the swing that an axis causes; None if it causes none.
 
-    Its valve is commanded every ``period_s`` seconds, which bounds the swing that a filter can run.
+    Its valve is commanded every ``period_s`` seconds; a swing too quick for a filter at that period
+    is not accepted.
     """
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
@@ -100,7 +101,7 @@ def sensor_of(
 
 
 def slewing_of(axis: str) -> FirstSlewing | None:
-    """Ask how fast an axis turns the crane; None if it does not turn it."""
+    """Ask how fast an axis turns the crane, and its largest radius; None if it does not turn it."""
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
@@ -113,9 +114,10 @@ def slewing_of(axis: str) -> FirstSlewing | None:
 
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:
-    """Return shortest and longest time of ten swings for which a filter runs at a valve's period.
+    """Return shortest and longest time of ten swings, s, for which a filter runs.
 
-    The filter must also run at the shortest swing that may be set on the running machine.
+    The filter must also run at the shortest swing that may be set on the running machine. If no
+    swing fits, the times that a file may state are returned. ``period_s``: between two commands.
     """
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s
@@ -127,7 +129,7 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
 
 def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | None:
-    """Ask about slew and near-far as one motion; None without both.
+    """Ask about slew and near-far as one motion; None without both, or if it is declined.
 
     ``others`` are the messages that may carry the measured radius.
     """
@@ -160,7 +162,10 @@ _CYCLES, _CYCLE_MS = 5, 200  # cycles in its proposed timeout; cycle if the DBC 
 def load_of(
     axes: Sequence[FirstAxis], messages: Sequence[Message], used: Collection[str]
 ) -> FirstLoad | None:
-    """Ask which signal says that a log is gripped; without one, if one response holds for both.
+    """Ask which signal says that a log is gripped.
+
+    If there is none, ask whether one response is to hold for an empty grapple and a log; None if
+    not, or if no axis swings.
 
     Args:
         axes: axes of the machine.
@@ -190,7 +195,7 @@ def load_of(
 def _possible(
     messages: Sequence[Message], used: Collection[str]
 ) -> tuple[dict[str, tuple[Message, Signal]], list[str]]:
-    """Return the signals that may carry the load state, and those of them with such a name."""
+    """Return the unused signals that can say that a log is gripped, and names of likely ones."""
     signals = {
         f"{message.name}.{signal.name}": (message, signal)
         for message, signal in suggest.loads(messages)
@@ -200,7 +205,7 @@ def _possible(
 
 
 def _values(signal: Signal) -> tuple[float, float]:
-    """Ask for the values of a signal with an empty grapple and with a log."""
+    """Ask for the values of a signal with an empty grapple and with a log; return (empty, log)."""
     if signal.length <= suggest.SWITCH_BITS:
         log = ask(f"  {signal.name}: its value while a log is gripped", whole(0, 1), "1")
         return 1.0 - log, float(log)
@@ -232,7 +237,7 @@ def _with_log(axes: Sequence[FirstAxis]) -> dict[str, float]:
 def code_meanings(signal: Signal, scaling: FirstScaling | None = None) -> dict[str, str]:
     """Ask whether named values (VAL_) whose names leave it open are faults or measurements.
 
-    ``scaling`` are the corrections of the signal from earlier answers.
+    ``scaling`` has corrections from earlier answers. Returned is "fault" or "value" by name.
     """
     if scaling:
         given = Scaling(full=scaling.full, zero=scaling.zero, invert=scaling.invert)

@@ -161,7 +161,7 @@ def _conclude(
     path: Path,
     as_json: bool,
 ) -> None:
-    """Show what the logs showed; write it into the file with its origin, if there is one."""
+    """Show what the logs showed; with an ``origin`` write both into the deployment file."""
     from canshaper.commissioning.identification.report import as_dict, headlines, write_sway
 
     seen = [one for one in findings if one.free or one.driven]
@@ -197,7 +197,7 @@ def _pump(
     channel: str | None,
     write: bool,
 ) -> list[str]:
-    """Return the flow of the pump as lines, from logs of two axes; write it into the file too."""
+    """Return the flow of the pump as lines, from logs of two axes; with ``write`` also write it."""
     from canshaper.commissioning.calibration.pump import drives_in, pair_of, pump_lines
     from canshaper.commissioning.identification.data import measured_in, paths_of, signals_named
 
@@ -224,7 +224,7 @@ def _print(
 def _next_steps(
     advice: Sequence["Advice"], deployment: "Deployment", written: Sequence[str]
 ) -> list[str]:
-    """Return what was written, and the command that designs the filter of each axis again."""
+    """Return lines that say what was written, and which command designs each filter again."""
     from canshaper.commissioning.origins import written_line
     from canshaper.shaping.registry import KINDS
 
