@@ -90,7 +90,9 @@ def machine_of(
         load=load,
     )
     uses = uses_of(machine, messages)
-    machine = replace(machine, data_bitrate=_data_bitrate(messages, uses, bitrate))
+    used |= {*uses, machine.status, machine.identity, *(axis.status for axis in axes)}
+    used.add(((motion and motion.radius) or "").partition(".")[0])
+    machine = replace(machine, data_bitrate=_data_bitrate(messages, used, bitrate))
     if not nodes.named:
         return machine
     return replace(machine, canopen=nodes.canopen(uses))
@@ -110,9 +112,11 @@ def _meanings(
     return used | ({motion.radius} if motion and motion.radius else set())
 
 
-def _data_bitrate(messages: list[Message], uses: Collection[str], bitrate: int) -> int | None:
+def _data_bitrate(
+    messages: list[Message], used: Collection[str | None], bitrate: int
+) -> int | None:
     """Ask for the data bit rate, bit/s, if a used message is one of CAN FD; else return None."""
-    if not any(is_fd(message) for message in messages if message.name in uses):
+    if not any(is_fd(message) for message in messages if message.name in used):
         return None
     most = limits(Bus, "data_bitrate")[1]
     text = "CAN FD: bit rate of the data, bit/s"
