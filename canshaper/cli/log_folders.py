@@ -43,15 +43,15 @@ class Log:
 
 
 def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
-    """Return (machine, path) of each log and black box below a folder, sorted by path.
+    """Return (machine, path) of each log in a folder and below, sorted by path.
 
-    Files with a suffix of ``bundles`` count too. A .txt file does not: most of them are notes.
+    Files with a suffix of ``bundles`` count too. A .txt file does not, though it may be a log.
     """
     known = {*FORMATS, SUFFIX, *bundles} - {".txt"}  # most of them are notes
     logs = [
         path
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and {*(suffix.lower() for suffix in path.suffixes[-2:])} & known
+        if path.is_file() and Path(path.name.lower().removesuffix(".gz")).suffix in known
     ]
     return [(path.parent.relative_to(folder).as_posix(), path) for path in logs]
 

@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
+from canshaper.cli.log_folders import logs_below
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Simulation
 from canshaper.machine.binding import load_deployment
@@ -112,6 +113,19 @@ def test_periods_of_all_machines_and_where_one_has_drifted(fleet: Path, tmp_path
     rows = {row["axis"]: row for row in logs(tmp_path)["south/monday.log"]["rows"]}
     near_far = rows["near_far"]
     assert abs(near_far["period_s"] - 2.2) < near_far["period_s_half"] + 0.02
+
+
+def test_what_is_made_of_a_log_is_none(tmp_path: Path) -> None:
+    (tmp_path / "north").mkdir()
+    logs = ["north/drive.log", "packed.ASC.gz", "stop.blackbox", "two.days.blf"]
+    others = ["notes.txt", "drive.log.png", "drive.log.bak", "stop.blackbox.part", "old.zip.part"]
+    for name in (*logs, *others, "bundle.zip"):
+        (tmp_path / name).touch()
+    found = [path.relative_to(tmp_path).as_posix() for _, path in logs_below(tmp_path)]
+    assert found == logs
+    assert ("north", tmp_path / "north" / "drive.log") in logs_below(tmp_path)
+    with_bundles = [path.name for machine, path in logs_below(tmp_path, ".zip") if machine == "."]
+    assert with_bundles == ["bundle.zip", *logs[1:]]
 
 
 @pytest.mark.parametrize("verb", [("replay", "--config"), ("identify", "--file")])
