@@ -251,9 +251,9 @@ def whole(low: float, high: float) -> Callable[[str], int]:
     return parse
 
 
-def period_ms(message: str) -> int:
+def period_ms(message: str, default: int = 20) -> int:
     """Ask for the period of a message, by name, whose DBC states none; return it in ms."""
-    return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")
+    return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), str(default))
 
 
 # End of a question, which lists possible answers; the table of proposals leaves it out.

@@ -121,8 +121,9 @@ class FirstMotion:
 class FirstLoad:
     """Time of ten swings with a log, by axis, and the signal that says that a log is gripped.
 
-    ``empty`` and ``log`` are values of the signal, ``codes`` the meaning of its named ones. Without
-    a message one response holds for both an empty grapple and a log.
+    ``empty`` and ``log`` are values of the signal, ``codes`` the meaning of its named ones;
+    ``cycle_ms`` is that of its message if the DBC states none. Without a message one response holds
+    for both an empty grapple and a log.
     """
 
     ten_swings_s: Mapping[str, float]
@@ -132,6 +133,7 @@ class FirstLoad:
     empty: float = 0.0
     log: float = 0.0
     codes: Mapping[str, str] = field(default_factory=dict)
+    cycle_ms: int | None = None
 
 
 @dataclass(frozen=True)

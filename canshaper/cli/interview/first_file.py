@@ -84,7 +84,8 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
         yield from _motion(machine.motion)
         yield ""
     if (load := machine.load) and load.message:
-        keys = {"message": load.message, "signal": load.signal, "timeout_ms": load.timeout_ms}
+        keys = {"message": load.message, "signal": load.signal, "cycle_ms": load.cycle_ms}
+        keys |= {"timeout_ms": load.timeout_ms}
         yield "# Load of the grapple. After timeout_ms of silence the axes use their own filters."
         yield f"load_state: {_flow(bus='crane', **keys, codes=_codes(load.codes))}"
         yield ""

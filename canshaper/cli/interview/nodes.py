@@ -196,7 +196,7 @@ def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Tim
         if axis.sensor:
             add(axis.sensor.message, axis.sensor.timeout_ms)
     if machine.load:
-        add(machine.load.message, machine.load.timeout_ms)
+        add(machine.load.message, machine.load.timeout_ms, machine.load.cycle_ms)
     return uses
 
 

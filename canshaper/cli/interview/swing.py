@@ -5,7 +5,16 @@ from collections.abc import Collection, Sequence
 
 from cantools.database.can import Message, Signal
 
-from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, confirmed, number, one, whole
+from canshaper.cli.interview.answers import (
+    MOST_OFFERED,
+    NONE,
+    ask,
+    confirmed,
+    number,
+    one,
+    period_ms,
+    whole,
+)
 from canshaper.cli.interview.first import (
     PERIOD_RANGE,
     RADIUS_M,
@@ -156,7 +165,7 @@ def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | Non
 
 # Proposals for a log: factor on the time of ten swings, and kg, as in forwarder-load.yaml.
 _SLOWER, _LOG_KG = 1.14, 600.0
-_CYCLES, _CYCLE_MS = 5, 200  # cycles in its proposed timeout; cycle if the DBC has none
+_CYCLES, _CYCLE_MS = 5, 200  # cycles in its timeout; its proposed cycle if the DBC has none
 
 
 def load_of(
@@ -186,10 +195,11 @@ def load_of(
         return FirstLoad(_with_log(swinging)) if confirmed(text, default=False) else None
     message, signal = signals[answer]
     empty, log = _values(signal)
-    timeout_ms = _CYCLES * (message.cycle_time or _CYCLE_MS)
+    cycle = message.cycle_time or period_ms(message.name, _CYCLE_MS)
+    own = None if message.cycle_time else cycle
     codes = code_meanings(signal)
-    swings = _with_log(swinging)
-    return FirstLoad(swings, message.name, signal.name, timeout_ms, empty, log, codes)
+    of_signal = message.name, signal.name, _CYCLES * cycle, empty, log, codes, own
+    return FirstLoad(_with_log(swinging), *of_signal)
 
 
 def _possible(
