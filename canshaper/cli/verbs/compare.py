@@ -135,7 +135,6 @@ def compare(
         results.print(shown)
     for _, why in advice.values():
         results.print(f"- {why}.")
-    end_interrupted(interrupted)
 
     def figure() -> "Figure":
         from canshaper.report.pareto import Point
@@ -149,6 +148,7 @@ def compare(
     title = f"{calm.name} leaves {calm.worst_30_deg:.1f}° of {off.worst_30_deg:.1f}° at worst"
     results.picture_line(results.picture(out / "compare.png", figure))
     results.write()
+    end_interrupted(interrupted)
 
 
 def _ropes(
