@@ -167,6 +167,8 @@ def test_every_row_names_its_axis_on_a_narrow_terminal(fleet: Path, tmp_path: Pa
         (("replay", "--config", PLAIN, "--verify"), "--verify: expected one log, got the folder "),
         (("replay", "--config", PLAIN, "--to", "5"), "--to: expected one log, got the folder "),
         (("identify", "--file", PLAIN, "--json"), "--json: expected one log, got the folder "),
+        (("identify", "--together"), "--together: expected one log, got the folder "),
+        (("identify", "--swings", "0"), "--swings: expected one log, got the folder "),
         (("identify", "more.log"), "more.log: expected a folder like "),
         (("replay", "--config", PLAIN, "--channel", "x=1"), "--channel: expected a bus, got x;"),
     ],

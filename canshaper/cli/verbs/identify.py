@@ -126,9 +126,12 @@ def identify(
         refuse_shipped(file)
     results = Results(TITLES[together], deployment, report, picture, quiet=as_json, soft_wrap=True)
     options: dict[str, Any] = {"axis": axis, "channel": channel, "about_s": about_s}
+    timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
+    by_hand = {name: value for name, value in timed.items() if value is not None}
     if logs and Path(logs[0]).is_dir():
         folders = [*map(Path, logs)]
-        check_only_folders(folders, {"--write": write, "--json": as_json, "--picture": picture})
+        of_one = {"--write": write, "--json": as_json, "--picture": picture, "--together": together}
+        check_only_folders(folders, of_one | dict.fromkeys(by_hand, True))
         work = partial(identified, file, signal or [], dbc or [], options)
         run_fleet(engine(processes, scheduler), work, folders, show_periods, out, results)
         return
@@ -139,8 +142,7 @@ def identify(
         results.conclude(lambda to: to.print("\n".join(pump)))
         return
     with os_errors(out):
-        timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
-        if any(v is not None for v in timed.values()):
+        if by_hand:
             findings = [timed_by_hand(timed, logs or [], axis_named(axis, deployment))]
         else:
             named = signals_named(signal or [], deployment), deployment
