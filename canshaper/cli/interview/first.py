@@ -35,7 +35,7 @@ class FirstJoystick:
         switch: message of its enable switch if that is another one.
         code: value of ``enable`` that enables, if its values have names.
         enable_of: joystick whose switch enables this one.
-        node: its CANopen node.
+        node: its CANopen node, if that has a heartbeat.
         multiplexor: value of the multiplexor with which its message carries the joystick.
     """
 
@@ -212,7 +212,7 @@ class FirstAxis:
     cycle_ms: int | None = None
     cia408: FirstCia408 | None = None
     node: str | None = None
-    """CANopen node of a valve without CiA 408."""
+    """CANopen node, with a heartbeat, of a valve without CiA 408."""
     codes: Mapping[str, str] = field(default_factory=dict)
     """Meaning of named values (VAL_) of its command, "fault" or "value", by name."""
     timeout_known: bool = False

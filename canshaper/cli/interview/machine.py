@@ -134,7 +134,7 @@ def _chosen(messages: list[Message]) -> list[str]:
 
 
 def _page(message: Message) -> tuple[Message, int | None]:
-    """Ask for a multiplexor value of a joystick; return its message of that value, and the value.
+    """Ask for the multiplexor value of a joystick; return its message at that value, and the value.
 
     A message without a multiplexor, or with several, is returned as it is, with None.
     """

@@ -178,7 +178,7 @@ class Nodes:
 
 
 def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Timing]:
-    """Return the timing of each message of joysticks, valves, sensors and load, by name."""
+    """Return the timing of messages of joysticks, switches, valves, sensors and load, by name."""
     cycles = {message.name: message.cycle_time for message in messages}
     uses: dict[str, Timing] = {}
 

@@ -57,7 +57,7 @@ def init(
 
     The file has reduced speed. Each axis that swings gets a robust shaper (without SciPy a G_FF for
     a start). Slew and near-far become one motion, which is off until the step motion of commission
-    is done. Numbers that init has guessed are listed under assumed.
+    is done. Numbers that init has guessed are listed under assumed, but for those with a log.
 
     Ctrl-C writes nothing. If the check of the whole file finds a fault, such as a missing enable
     switch, the answers are kept in a draft next to it. For a J1939 machine begin with a copy of the

@@ -108,7 +108,8 @@ def _changed(
     """Return a loader that applies these options, and refuses what may not run with a ConfigError.
 
     Refused are, without ``listen_only``, an axis with a long stop but no stop_distance_m and,
-    without ``simulated``, the curve of a simulated crane for a valve on a real bus.
+    without ``simulated``, the curve of a simulated crane for a valve on a real bus; and a
+    ``control`` socket for a file without a section control.
     """
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError, Problem

@@ -264,7 +264,7 @@ def serve(
 
 
 def _transports(interface: str | None, channels: list[str]) -> list["Transport"]:
-    """Return the two buses of the simulated cranes; without a channel those of udp_multicast.
+    """Return the buses of the simulated cranes: the first two channels, else two of udp_multicast.
 
     Raises:
         UsageError: there is no such channel, or the joysticks might move a real machine on it.
