@@ -31,7 +31,11 @@ LINUX_ONLY = {"commission", "doctor", "gateway", "metrics", "run", "set"}
 
 
 class Verbs(TyperGroup):
-    """Group of all verbs; a CanshaperError or an OSError ends a verb with one line."""
+    """All verbs as one group, each imported when it is used.
+
+    A CanshaperError, Ctrl-C or an OSError that names a file ends a verb with a message and an exit
+    code; any other error passes.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -39,11 +43,11 @@ class Verbs(TyperGroup):
         self.commands = cast(Any, dict.fromkeys(names))  # each loaded when it is used
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the verbs."""
+        """Return the names of the verbs, sorted, without loading one."""
         return list(self.commands)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a verb; None where there is no such verb."""
+        """Return a verb, loaded at its first use; None where there is no such verb."""
         if cmd_name not in self.commands:
             return None
         return self.commands[cmd_name] or self._load(cmd_name)
@@ -71,7 +75,7 @@ class Verbs(TyperGroup):
                 formatter.write_dl(rows[group])
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the verb that is named."""
+        """Run the verb; print an error that ends it, and raise typer.Exit with its exit code."""
         try:
             return super().invoke(ctx)
         except CanshaperError as error:
@@ -95,7 +99,7 @@ def _module(name: str) -> Any:
 
 
 def pasteable(text: str) -> str:
-    """Return the help with examples that can be pasted: a long one is continued by a backslash."""
+    """Return the help of a verb, its examples ready to paste: a backslash continues a long one."""
     paragraphs = []
     for paragraph in cleandoc(text).split("\n\n"):
         words = " ".join(paragraph.split())
@@ -146,7 +150,7 @@ def _main(
 
 
 def main() -> None:
-    """Entry point of the command."""
+    """Run the command line; a missing optional package ends it with the way to install it."""
     try:
         app(prog_name="canshaper")
     except ModuleNotFoundError as error:

@@ -99,7 +99,7 @@ PICTURE = typer.Option(
 
 
 class Stop:
-    """Records that SIGTERM or SIGINT asked the verb to stop; a second signal ends it at once."""
+    """Catches SIGTERM and SIGINT; one sets ``requested``, a second of the same ends the verb."""
 
     def __init__(self) -> None:
         self.requested = False
@@ -115,7 +115,13 @@ class Stop:
 def engine(
     processes: int | None, scheduler: str | None, cluster: Literal["slurm"] | None = None
 ) -> "Engine":
-    """Return what runs parallel work: processes on this computer, a Dask cluster, or Slurm jobs."""
+    """Return what runs parallel work: processes on this computer, a Dask cluster, or Slurm jobs.
+
+    ``processes`` is also the number of Slurm jobs; None means one process for each processor.
+
+    Raises:
+        UsageError: ``cluster`` comes without ``processes`` or with ``scheduler``.
+    """
     from canshaper.campaign.engine import Cluster, Slurm
     from canshaper.design.parallel import Processes
 
@@ -142,7 +148,7 @@ def fail(error: Exception, code: int | None = None) -> typer.Exit:
 
 
 def end_interrupted(at: str) -> None:
-    """End the verb with EXIT_INTERRUPTED if Ctrl-C interrupted it ``at`` a task; "" means no."""
+    """End the verb with exit code 130 if Ctrl-C interrupted it; ``at`` says where, "" if not."""
     if at:
         echo(f"interrupted at {at}", err=True)
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -150,7 +156,7 @@ def end_interrupted(at: str) -> None:
 
 @contextmanager
 def os_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError in the block into a UsageError with the file and the reason."""
+    """Turn an OSError in the block into a UsageError: its file, else ``path``, and its reason."""
     try:
         yield
     except OSError as error:
@@ -158,31 +164,23 @@ def os_errors(path: Path) -> Iterator[None]:
 
 
 def install_line(package: str) -> str:
-    """Return the pip command that installs a package with the others of its extra."""
+    """Return the pip command that installs an optional package and the others of its extra."""
     packages = [name for name, extra in EXTRAS.items() if extra == EXTRAS[package]]
     return f"{shlex.quote(sys.executable)} -m pip install {' '.join(packages)}"
 
 
 def refuse_shipped(file: str, option: str = "--write") -> None:
-    """Refuse to write into a deployment that is shipped with the package.
-
-    Args:
-        file: name on the command line.
-        option: option that asks for writing, named in the error.
-
-    Raises:
-        ConfigError: the name means a shipped deployment.
-    """
+    """Raise a ConfigError for ``option`` if the file to write into is shipped with the package."""
     if deployment_path(file) != Path(file):
         text = "shipped with the package; copy it, then write to the copy"
         raise ConfigError([Problem(file, None, option, text)])
 
 
 def sensed(file: str, sensor: bool) -> str:
-    """Return the file to load: with ``--sensor`` the shipped deployment with a sway sensor.
+    """Return the file to load: the shipped one with a sway sensor if ``--sensor`` is given alone.
 
     Raises:
-        UsageError: the command line has both a file and ``--sensor``.
+        UsageError: ``--sensor`` comes with another file than the default one.
     """
     if sensor and file != DEFAULT:
         raise UsageError(f"--sensor: expected without FILE, got {file}: it is {SENSED}")
@@ -199,7 +197,8 @@ def loader(
 ) -> "Callable[[], Deployment]":
     """Return a function that loads the deployment and applies the bus options of the command line.
 
-    With ``inside`` the function reads no DBC file outside of that directory.
+    A channel is CHANNEL, or NAME=CHANNEL with several buses; ``network`` needs udp_multicast. With
+    ``inside`` no DBC file outside of that directory is read. The function raises a ConfigError.
     """
     from canshaper.machine.binding import load_deployment
 
@@ -244,7 +243,7 @@ def names_of(paths: Sequence[Path]) -> list[str]:
 
 
 def channels_of(given: Sequence[str]) -> dict[str, str]:
-    """Parse BUS=CHANNEL options; return the channel of the log by bus."""
+    """Parse BUS=CHANNEL options; return the channel of the log by bus, or raise BadParameter."""
     channels = {}
     for item in given:
         bus, mark, channel = item.partition("=")
@@ -261,11 +260,7 @@ def buses_line(deployment: "Deployment") -> str:
 
 
 def control_socket(deployment: "Deployment") -> Path:
-    """Return the path of the daemon's control socket.
-
-    Raises:
-        UsageError: the file has no control section.
-    """
+    """Return the path of the daemon's control socket; UsageError without a control section."""
     section = deployment.config.control
     if section is None:
         text = (
@@ -277,7 +272,7 @@ def control_socket(deployment: "Deployment") -> Path:
 
 
 def print_warnings(count: int, warnings: list[Problem], are: str) -> None:
-    """Print how many warnings the DBC files gave, and the first of them.
+    """Print how many warnings the DBC files gave, and the first ten; nothing where there is none.
 
     ``are`` says which messages and tables they are about, such as "not used".
     """

@@ -20,7 +20,7 @@ BUNDLE = ".zip"
 
 
 def is_drive(file: str) -> bool:
-    """Return whether the suffix is that of a log, a black box or a recording."""
+    """Return whether the suffix, without .gz, is that of a log, a black box or a recording."""
     from canshaper.recording.log import FORMATS
 
     suffix = Path(file.lower().removesuffix(".gz")).suffix
@@ -37,7 +37,7 @@ def opened_drives(
     window: "Window",
     changes: Sequence[str],
 ) -> "list[Choice]":
-    """Return the drives that the page offers. The first is made now, so that its errors show here.
+    """Return the drives that the page offers; the first is driven now, the others when chosen.
 
     Args:
         file: log, black box or recording; with ``seeds`` or ``folder`` a deployment.
@@ -45,12 +45,12 @@ def opened_drives(
         seeds: seeds of drives of a campaign.
         folder: folder of a campaign; its worst drives follow the seeds.
         channels: channels of a log, as BUS=CHANNEL.
-        window: part of a log to show, seconds.
+        window: begin and end of the part of a log to show, s; end None: up to the end of the log.
         changes: parameters of the simulated crane, as NAME=VALUE.
 
     Raises:
-        UsageError: the options exclude each other.
-        CanshaperError: the first drive cannot be replayed or driven.
+        UsageError: the options exclude each other, or a log has no deployment.
+        CanshaperError: a file or the campaign is wrong, or the first drive cannot be driven.
     """
     if len(others) > MOST_DEPLOYMENTS:
         raise UsageError(f"--with: expected {MOST_DEPLOYMENTS} at most, got {len(others)}")
@@ -130,10 +130,10 @@ def _drives_of_campaign(
 
 
 def _worst(folder: Path, deployment: "Deployment", changes: Sequence[str]) -> dict[int, str]:
-    """Return the titles of the worst drives of a campaign, by seed.
+    """Return the titles of the ten worst drives of a campaign, by seed, the worst one first.
 
     Raises:
-        CampaignError: the folder has no drives, or those of another campaign.
+        CampaignError: the folder has no drives, or those of another deployment or other changes.
     """
     from canshaper.campaign.run import Source
     from canshaper.campaign.store import Store

@@ -31,8 +31,8 @@ class Log:
 
     Attributes:
         path: the file.
-        machine: its folder, relative to the folder on the command line.
-        rows: one row for each axis and deployment.
+        machine: its folder, relative to the folder on the command line; "." is that folder.
+        rows: one row for each axis and deployment; none of a log that could not be read.
         fault: why the log could not be read; empty if it could.
     """
 
@@ -43,12 +43,15 @@ class Log:
 
 
 def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
-    """Return (machine, path) of every log or bundle below a folder, sorted by name."""
+    """Return (machine, path) of each log in a folder and below, sorted by path.
+
+    Files with a suffix of ``bundles`` count too. A .txt file does not, though it may be a log.
+    """
     known = {*FORMATS, SUFFIX, *bundles} - {".txt"}  # most of them are notes
     logs = [
         path
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and {*(suffix.lower() for suffix in path.suffixes[-2:])} & known
+        if path.is_file() and Path(path.name.lower().removesuffix(".gz")).suffix in known
     ]
     return [(path.parent.relative_to(folder).as_posix(), path) for path in logs]
 
@@ -56,12 +59,8 @@ def logs_below(folder: Path, *bundles: str) -> list[tuple[str, Path]]:
 def check_only_folders(paths: Sequence[Path], options: Mapping[str, object]) -> None:
     """Refuse single logs, and options for a single log, next to a folder.
 
-    Args:
-        paths: paths of the command line; the first is a folder.
-        options: values of the options for a single log, by name.
-
     Raises:
-        UsageError: a path is no folder, or one of the options was given.
+        UsageError: a path is no folder like the first, or one of ``options`` has a value.
     """
     if others := [str(path) for path in paths if not path.is_dir()]:
         raise UsageError(f"{others[0]}: expected a folder like {paths[0]}, got none")
@@ -81,7 +80,7 @@ def run_fleet(
 
     Args:
         engine: runs the work in parallel.
-        work: returns the rows of a log.
+        work: returns the rows of a log; its CanshaperError or OSError becomes the log's fault.
         folders: folders of the logs.
         show: prints the tables; it gets all logs, sorted by machine and path.
         out: folder for ``fleet.json``.
@@ -114,7 +113,10 @@ def _one(work: Callable[[Path], list[Row]], log: tuple[str, Path]) -> Log:
 
 
 def replayed(configs: tuple[str, ...], channels: Mapping[str, str], path: Path) -> list[Row]:
-    """Drive each deployment with a log; return a row for each axis that moved."""
+    """Drive the controller of each deployment with a log; return a row for each of its axes.
+
+    ``channels`` are those of the log, by bus. A log that is shorter than two ticks has no rows.
+    """
     from canshaper.recording.replay import Replay, look
     from canshaper.recording.report import Replayed, Trace
 
@@ -155,7 +157,10 @@ def identified(
     options: Mapping[str, Any],
     path: Path,
 ) -> list[Row]:
-    """Identify period and damping in a log; return a row for each axis."""
+    """Identify period and damping in a log; return a row for each axis, also of too little data.
+
+    ``signals`` are AXIS=NAME; ``options`` are axis, channel and about_s of the command line.
+    """
     from canshaper.commissioning.identification.canlog import messages_of
     from canshaper.commissioning.identification.data import logged, signals_named
 
@@ -182,7 +187,7 @@ def identified(
 
 
 def _start_ns(path: Path) -> int:
-    """Return the time of the first frame; 0 for a phone's table, which has no date."""
+    """Return the time of a log's first frame, ns since 1970; 0 without one, as of a table."""
     try:
         return next((frame.time_ns for frame in LogFile(path)), 0)
     except CanshaperError:
@@ -190,9 +195,10 @@ def _start_ns(path: Path) -> int:
 
 
 def period_drifts(logs: Sequence[Log]) -> Iterator[str]:
-    """Yield a line for each axis whose period changed by more than the intervals of both logs.
+    """Yield a line for each axis of a machine whose period has drifted.
 
-    The first day of the axis is compared with its last one.
+    Of the logs with enough data the first day is compared with the last one: the period has drifted
+    if it changed by more than both half intervals (95 %) together.
     """
     by_axis: dict[tuple[str, str], list[Row]] = {}
     for log in logs:
@@ -262,7 +268,7 @@ def show_periods(logs: Sequence[Log], results: Results) -> None:
 
 
 def _finish(logs: Sequence[Log], out: Path, results: Results) -> int:
-    """Print notes and faults of the logs, write ``fleet.json``, and return the exit code."""
+    """Print notes and faults, write ``fleet.json``; return 1 if a log was not read, else 0."""
     for log in logs:
         for note in dict.fromkeys(text for row in log.rows for text in row["notes"]):
             results.print(f"note: {_name(log)}: {note}", soft_wrap=True)

@@ -29,17 +29,14 @@ MOST_SVG_BYTES = 400_000
 
 
 class Results(SafeConsole):
-    """Console of a verb; it keeps everything it prints for the report.
+    """Console of a verb; what ``print`` gets also goes into the report.
 
     Args:
         title: title of the report.
-        deployment: deployment that the results are about, if any.
+        deployment: deployment that the results are about, if any; a verb may set it later.
         report: file to write the report to; None for no report.
         picture: file for the picture, instead of the verb's default.
         options: options of rich's console.
-
-    Attributes:
-        deployment: as above; a verb may set it later.
 
     Raises:
         UsageError: report or picture has a suffix that cannot be written.
@@ -76,11 +73,11 @@ class Results(SafeConsole):
         super().print(*objects, **options)
 
     def picture(self, path: Path | None, figure: Callable[[], "Figure"]) -> Path | None:
-        """Draw a picture, stamp it with file, version and date, and write it.
+        """Draw a picture, stamp it with file, version and date, write it and add it to the report.
 
         Args:
             path: file unless --picture names one; None to draw it for the report only.
-            figure: draws the picture.
+            figure: draws the picture; not called where neither a file nor a report is asked for.
 
         Returns:
             The written file; None if none was written or matplotlib is missing.
@@ -104,7 +101,7 @@ class Results(SafeConsole):
         return path
 
     def picture_line(self, path: Path | None) -> None:
-        """Print where the picture is, or why there is none; the report needs no such line."""
+        """Print, not in the report, where the picture is; None means that matplotlib is missing."""
         super().print(f"Picture: {path or _no_picture()}", soft_wrap=True)
 
     def conclude(
@@ -122,8 +119,8 @@ class Results(SafeConsole):
         Args:
             show: prints the results.
             figure: draws their picture; None where there is nothing to draw.
-            path: as of ``picture``.
-            data: of ``--json``, by the file of the picture; None without that option.
+            path: file of the picture unless --picture names one; None: for the report only.
+            data: returns what --json prints, given the written picture; None without --json.
             finish: writes into the deployment file; returns lines on that, and what to do next.
             code: exit code.
 

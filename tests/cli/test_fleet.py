@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
+from canshaper.cli.log_folders import logs_below
 from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Simulation
 from canshaper.machine.binding import load_deployment
@@ -114,6 +115,19 @@ def test_periods_of_all_machines_and_where_one_has_drifted(fleet: Path, tmp_path
     assert abs(near_far["period_s"] - 2.2) < near_far["period_s_half"] + 0.02
 
 
+def test_what_is_made_of_a_log_is_none(tmp_path: Path) -> None:
+    (tmp_path / "north").mkdir()
+    logs = ["north/drive.log", "packed.ASC.gz", "stop.blackbox", "two.days.blf"]
+    others = ["notes.txt", "drive.log.png", "drive.log.bak", "stop.blackbox.part", "old.zip.part"]
+    for name in (*logs, *others, "bundle.zip"):
+        (tmp_path / name).touch()
+    found = [path.relative_to(tmp_path).as_posix() for _, path in logs_below(tmp_path)]
+    assert found == logs
+    assert ("north", tmp_path / "north" / "drive.log") in logs_below(tmp_path)
+    with_bundles = [path.name for machine, path in logs_below(tmp_path, ".zip") if machine == "."]
+    assert with_bundles == ["bundle.zip", *logs[1:]]
+
+
 @pytest.mark.parametrize("verb", [("replay", "--config"), ("identify", "--file")])
 def test_a_folder_without_logs_is_reported(verb: tuple[str, str], tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
@@ -153,6 +167,8 @@ def test_every_row_names_its_axis_on_a_narrow_terminal(fleet: Path, tmp_path: Pa
         (("replay", "--config", PLAIN, "--verify"), "--verify: expected one log, got the folder "),
         (("replay", "--config", PLAIN, "--to", "5"), "--to: expected one log, got the folder "),
         (("identify", "--file", PLAIN, "--json"), "--json: expected one log, got the folder "),
+        (("identify", "--together"), "--together: expected one log, got the folder "),
+        (("identify", "--swings", "0"), "--swings: expected one log, got the folder "),
         (("identify", "more.log"), "more.log: expected a folder like "),
         (("replay", "--config", PLAIN, "--channel", "x=1"), "--channel: expected a bus, got x;"),
     ],

@@ -51,6 +51,28 @@ def test_messages_of_can_fd_make_the_bus_one(tmp_path: Path) -> None:
     assert load_deployment(classical).config.buses["crane"].fd is False
 
 
+# Of the status of an axis, of the service, of the identity; and the radius of the tip.
+@pytest.mark.parametrize("can_id", [768, 784, 785, 1025])
+def test_a_message_that_is_no_command_makes_the_bus_one_of_can_fd(
+    can_id: int, tmp_path: Path
+) -> None:
+    text = DBC.read_text(encoding="utf-8")
+    kinds = ",".join(f'"{number}"' for number in range(14)) + ',"StandardCAN_FD"'
+    for line, more in (
+        ("BA_DEF_ BO_", f'BA_DEF_ BO_ "VFrameFormat" ENUM {kinds};'),
+        ("BA_DEF_DEF_", 'BA_DEF_DEF_ "VFrameFormat" "0";'),
+        ("BA_ ", f'BA_ "VFrameFormat" BO_ {can_id} 14;'),
+    ):
+        text = text.replace(f"\n{line}", f"\n{more}\n{line}", 1)
+    dbc, file = tmp_path / "1.dbc", tmp_path / "machine.yaml"
+    dbc.write_text(text, encoding="utf-8")
+    arguments = ["init", str(file), "--dbc", str(dbc)]
+    result = CliRunner().invoke(app, arguments, input="\n" * 60, prog_name="canshaper")
+    assert result.exit_code == 0, result.output
+    assert "message: TipPosition, signal: Radius" in file.read_text(encoding="utf-8")
+    assert load_deployment(file).config.buses["crane"].data_bitrate == 2_000_000
+
+
 @pytest.mark.slow
 def test_messages_that_cannot_be_used_are_shown_and_left_out(tmp_path: Path) -> None:
     other = tmp_path / "other.dbc"

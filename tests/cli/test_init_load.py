@@ -88,6 +88,21 @@ def test_where_nothing_swings_nothing_is_asked(tmp_path: Path) -> None:
         asked(tmp_path, f"{GRIPPED} = -", ())
 
 
+@pytest.mark.parametrize(("answer", "times_ms"), [("", (200, 1000)), ("50", (50, 250))])
+def test_the_period_of_its_message_is_asked_where_the_dbc_has_none(
+    answer: str, times_ms: tuple[int, int], tmp_path: Path
+) -> None:
+    lines = LOAD_DBC.read_text(encoding="utf-8").splitlines()
+    bare = tmp_path / "load.dbc"
+    bare.write_text("\n".join(one for one in lines if not one.startswith('BA_ "GenMsgCycleTime"')))
+    text = f"GrappleLoad: period = {answer}\n" if answer else ""
+    done = of_dbc(tmp_path, [DBC, bare], text)
+    assert done.exit_code == 0, done.output
+    load = load_deployment(tmp_path / "machine.yaml").config.load_state
+    assert load is not None
+    assert (load.cycle_ms, load.timeout_ms) == times_ms
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("signal", ["Weight", "Gripped", "-"])
 def test_the_file_has_both_sets_or_one_for_both(signal: str, tmp_path: Path) -> None:

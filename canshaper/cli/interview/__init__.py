@@ -1,1 +1,1 @@
-"""The questions of ``canshaper init``: answers, a checked machine, the text of its file."""
+"""Questions of ``canshaper init``, their answers, and the text of the first deployment file."""

@@ -23,8 +23,9 @@ MOST_LISTED = 20
 class Given:
     """Answers from a file, so that no one is asked.
 
-    A line is ``QUESTION = ANSWER``. The question is given by its first words, that of an axis with
-    its name first; ``#`` begins a comment. A question without a line gets its default.
+    A line is ``QUESTION = ANSWER`` and answers one question. The question is given by its first
+    words, that of an axis with its name first, as in ``slew: time of ten``; ``#`` begins a comment.
+    A question without a line gets its default.
 
     Args:
         path: the file; None answers every question with its default.
@@ -61,10 +62,12 @@ class Given:
             raise ConfigError(problems)
 
     def answer(self, text: str, parse: Callable[[str], _T], default: str) -> _T:
-        """Return the parsed answer to a question.
+        """Return the parsed answer of the first unused line that fits ``text``, else the default.
+
+        A question with two leading spaces names its axis; those with four are about the same axis.
 
         Raises:
-            ConfigError: the answer is invalid.
+            ConfigError: the answer or the default is invalid.
         """
         question = text.strip()
         if text.startswith("    "):  # another question about the same axis
@@ -80,11 +83,7 @@ class Given:
             raise ConfigError([Problem(str(self._path), number, words, str(error))]) from None
 
     def check_all_used(self) -> None:
-        """Check that every line answered a question.
-
-        Raises:
-            ConfigError: some lines did not.
-        """
+        """Raise a ConfigError with every line that answered no question."""
         problems = [
             Problem(
                 str(self._path),
@@ -102,14 +101,14 @@ class Proposed:
     """Answers every question with its proposal, and keeps both for a person to look at.
 
     Attributes:
-        rows: questions with their proposals.
+        rows: (question, proposal) of the answered questions, in their order.
     """
 
     def __init__(self) -> None:
         self.rows: list[tuple[str, str]] = []
 
     def answer(self, text: str, parse: Callable[[str], _T], default: str) -> _T:
-        """Return the parsed proposal.
+        """Return the parsed proposal, and keep it in ``rows``.
 
         Raises:
             ValueError: the question has no valid proposal.
@@ -134,9 +133,13 @@ def _answered(given: Given | Proposed | None) -> Iterator[None]:
 
 @contextmanager
 def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
-    """Answer the questions in the block from a file, if there is one.
+    """Answer the questions in the block from a file, else by defaults (``yes``), else ask a person.
 
-    Questions without a line get their defaults. With ``yes`` and no file all questions do.
+    A question without a line in the file gets its default.
+
+    Raises:
+        OSError: the file cannot be read.
+        ConfigError: the file is wrong, or a line of it answered no question.
     """
     given = Given(path) if path or yes else None
     with _answered(given):
@@ -146,14 +149,18 @@ def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
 
 
 def confirmed(text: str, *, default: bool) -> bool:
-    """Ask a question that is answered by yes or no."""
+    """Ask a question of yes or no; return whether the answer is yes."""
     if _given:
         return _given.answer(text, one(("yes", "no")), "yes" if default else "no") == "yes"
     return typer.confirm(text, default=default)
 
 
 def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
-    """Ask until ``parse`` accepts the answer; return what it makes of it."""
+    """Return the answer to a question, parsed; a person is asked until ``parse`` accepts it.
+
+    ``default`` is the proposal, "" for none. An invalid answer of a file raises a ConfigError; so
+    does an invalid proposal, or a ValueError where all proposals are accepted at once.
+    """
     if _given:
         return _given.answer(text, parse, default)
     while True:
@@ -165,7 +172,7 @@ def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
 
 
 def name(used: Collection[str]) -> Callable[[str], str]:
-    """Return a parser of an unused name for a deployment file, or NONE."""
+    """Return a parser of an unused name for the deployment file, or of "-" for none."""
 
     from canshaper.edit.edit import plain
 
@@ -181,14 +188,14 @@ def name(used: Collection[str]) -> Callable[[str], str]:
 
 
 def channel(text: str) -> str:
-    """Parse the name of a CAN interface."""
+    """Return the text if it can name a CAN interface, printable without spaces; else ValueError."""
     if not text or not text.isprintable() or " " in text:
         raise ValueError(f"expected a name without spaces, such as can0, got {text!r}")
     return text
 
 
 def _listed(allowed: Sequence[str], text: str) -> str:
-    """Return up to MOST_LISTED allowed words, the typed text, and a word that resembles it."""
+    """Return the end of an error text: the first allowed words, the typed one, a similar one."""
     names = ", ".join(allowed[:MOST_LISTED])
     more = f" and {len(allowed) - MOST_LISTED} more" if len(allowed) > MOST_LISTED else ""
     return f"{names}{more}, got {text!r}{did_you_mean(text, allowed)}"
@@ -244,9 +251,9 @@ def whole(low: float, high: float) -> Callable[[str], int]:
     return parse
 
 
-def period_ms(message: str) -> int:
-    """Ask for the period of a message, ms."""
-    return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")
+def period_ms(message: str, default: int = 20) -> int:
+    """Ask for the period of a message, by name, whose DBC states none; return it in ms."""
+    return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), str(default))
 
 
 # End of a question, which lists possible answers; the table of proposals leaves it out.
@@ -260,7 +267,7 @@ def accepted(ask: Callable[[], _T]) -> _T | None:
         ask: asks the questions, and returns a result from the answers.
 
     Returns:
-        The result; None if the person declines, or a question has no valid proposal.
+        The result; None if the person declines, a proposal is invalid, or on a UsageError.
     """
     from canshaper.report.console import SafeConsole, new_table
 

@@ -37,7 +37,11 @@ def add_axes(
 ) -> None:
     """Ask about the axes of a joystick and append them to ``axes``.
 
-    ``others`` are the messages that belong to no joystick; those of chosen valves are removed.
+    ``others`` are the messages that belong to no joystick; that of a chosen valve is removed when
+    no other signal of it is left for a valve. ``message`` is that of the joystick.
+
+    Raises:
+        UsageError: three periods of a valve are longer than any timeout that a file may state.
     """
     two_sided = suggest.velocities(message)
     for command in two_sided or suggest.one_sided(message):
@@ -91,7 +95,7 @@ def _valve_of(
 ) -> tuple[Message, Signal] | None:
     """Ask for message and signal of the valve of an axis; None if the axis is left out.
 
-    The message leaves ``others`` when none of its other signals can command a valve.
+    The message leaves ``others`` when no other signal of it is left to command a valve.
     """
     candidates = suggest.valves(others, command.name)
     possible = [m for m in candidates if _valve_timeouts(m.cycle_time or 0) is not None]
@@ -129,6 +133,9 @@ def _timeout(axis: str, cycle_ms: int, set_ms: int) -> tuple[int, bool]:
 
     Returns:
         The timeout in ms, and whether it is known: from the EDS, or typed instead of our proposal.
+
+    Raises:
+        UsageError: three periods of the valve are longer than any timeout that a file may state.
     """
     timeouts = _valve_timeouts(cycle_ms)
     if timeouts is None:
@@ -145,7 +152,10 @@ MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
 
 
 def command_scaling(signal: Signal, message: Message) -> FirstScaling:
-    """Ask how a signal encodes the direction: by a middle value, flags, or a second signal."""
+    """Ask how a signal encodes the direction: by a middle value, flags, or a second signal.
+
+    Nothing is asked if its DBC range is symmetrical, only full and invert if it has both signs.
+    """
     if symmetrical_range(signal) is None:
         return FirstScaling()
     if suggest.two_sided(signal):
@@ -168,7 +178,7 @@ def command_scaling(signal: Signal, message: Message) -> FirstScaling:
 
 
 def valve_scaling(signal: Signal) -> FirstScaling:
-    """Ask for the scaling of a valve's signal where the DBC does not state it."""
+    """Ask for the scaling of a valve's signal, unless its DBC range is symmetrical."""
     if symmetrical_range(signal) is None:
         return FirstScaling()
     return _around_zero(signal) if suggest.two_sided(signal) else _around_middle(signal)
@@ -187,7 +197,7 @@ def _around_middle(signal: Signal) -> FirstScaling:
 
 
 def _full(signal: Signal, zero: float) -> float:
-    """Ask for the value from zero to full command."""
+    """Ask how far a signal's value at full command is from ``zero``, its value without command."""
     likely = suggest.likely_full(signal, zero)
     distance = f", from {zero:g}" if zero else ""
     text = f"  {signal.name}: its value at full{distance}"

@@ -27,15 +27,16 @@ PERIOD_RANGE = (0.7, 1.4)
 
 @dataclass(frozen=True)
 class FirstJoystick:
-    """A joystick.
+    """A joystick: its message and its switches.
 
     Attributes:
+        enable, reset, anti_sway_off: signals of its switches; a bit of one is SIGNAL/BIT.
         cycle_ms: cycle of its message if the DBC states none.
         switch: message of its enable switch if that is another one.
-        code: value of that switch's signal that enables.
+        code: value of ``enable`` that enables, if its values have names.
         enable_of: joystick whose switch enables this one.
-        node: its CANopen node.
-        multiplexor: value at which the multiplexed message is meant.
+        node: its CANopen node, if that has a heartbeat.
+        multiplexor: value of the multiplexor with which its message carries the joystick.
     """
 
     name: str
@@ -55,7 +56,10 @@ class FirstJoystick:
 
 @dataclass(frozen=True)
 class Stopwatch:
-    """Ten swings by the stopwatch: time, amplitudes of the first and last one, speed of the tip."""
+    """Ten swings by the stopwatch.
+
+    ``first`` and ``last``: amplitude of the first swing and of that after the tenth, in one unit.
+    """
 
     ten_swings_s: float
     first: float
@@ -69,19 +73,19 @@ class Stopwatch:
 
     @property
     def decay_per_swing(self) -> float:
-        """Part of the amplitude that a full swing loses."""
+        """Part of the amplitude that a full swing loses, 0 to 1."""
         return 1.0 - math.pow(self.last / self.first, 0.1)
 
     @property
     def filter(self) -> Filter:
-        """G_FF filter to begin with."""
+        """G_FF filter to begin with: two real poles next to the frequency of the swing."""
         omega = 2.0 * math.pi / self.period_s
         poles = [float(rounded(-share * omega)) for share in POLES_TO_OMEGA]
         return filter_of("gff", poles_rad_s=poles)
 
     @property
     def sway(self) -> Sway:
-        """Sway data of an axis, as measured by the stopwatch."""
+        """Sway data of an axis, as measured by the stopwatch, with four significant digits."""
         period, decay = (float(rounded(v)) for v in (self.period_s, self.decay_per_swing))
         speed = self.full_speed_m_s
         return Sway(period_s=period, decay_per_swing=decay, full_speed_m_s=speed)
@@ -102,7 +106,10 @@ class FirstSlewing:
 
 @dataclass(frozen=True)
 class FirstMotion:
-    """Slew and near-far as one motion; ``radius`` is MESSAGE.SIGNAL if the radius is measured."""
+    """Slew and near-far as one motion.
+
+    ``radius`` is MESSAGE.SIGNAL if it is measured, ``radius_codes`` the meaning of named values.
+    """
 
     slew: str
     near_far: str
@@ -114,8 +121,9 @@ class FirstMotion:
 class FirstLoad:
     """Time of ten swings with a log, by axis, and the signal that says that a log is gripped.
 
-    ``empty`` and ``log`` are the values of the signal. Without a signal one response holds for both
-    an empty grapple and a log.
+    ``empty`` and ``log`` are values of the signal, ``codes`` the meaning of its named ones;
+    ``cycle_ms`` is that of its message if the DBC states none. Without a message one response holds
+    for both an empty grapple and a log.
     """
 
     ten_swings_s: Mapping[str, float]
@@ -125,11 +133,16 @@ class FirstLoad:
     empty: float = 0.0
     log: float = 0.0
     codes: Mapping[str, str] = field(default_factory=dict)
+    cycle_ms: int | None = None
 
 
 @dataclass(frozen=True)
 class FirstSensor:
-    """A sway sensor, which is only watched at first; ``fusion_s`` belongs to an inclination."""
+    """A sway sensor, which is only watched at first; ``kind`` is rate, angle or inclination.
+
+    ``fusion_s``: time constant with which accelerations correct the gyro of an inclination.
+    ``codes``: meaning of the named values of its signal.
+    """
 
     message: str
     signal: str
@@ -142,7 +155,7 @@ class FirstSensor:
 
 @dataclass(frozen=True)
 class FirstCanopen:
-    """Our own CANopen node, and the others by name: id and heartbeat timeout (ms)."""
+    """Id of our CANopen node, whether it starts the others, and their ids and timeouts (ms)."""
 
     node: int
     master: bool
@@ -151,7 +164,7 @@ class FirstCanopen:
 
 @dataclass(frozen=True)
 class FirstCia408:
-    """Control word of a CiA 408 valve, and message and signal of its status word."""
+    """Signal of a CiA 408 valve's control word, and message and signal of its status word."""
 
     control: str
     message: str
@@ -164,6 +177,7 @@ class FirstCia408:
 class FirstScaling:
     """Scaling of a signal where the DBC does not state it.
 
+    ``zero`` is the value without a command, ``full`` how far that at full command is from it.
     ``flags`` are the signals of neutral, negative and positive; ``negative`` is the second signal
     of a rocker.
     """
@@ -177,7 +191,10 @@ class FirstScaling:
 
 @dataclass(frozen=True)
 class FirstAxis:
-    """An axis: joystick, valve, and its swing and slewing if it has them."""
+    """An axis: joystick, valve, and its swing, slewing and sensor if it has them.
+
+    ``valve`` and ``status`` are messages; ``signal`` and ``cycle_ms`` are those of the valve.
+    """
 
     name: str
     joystick: str
@@ -195,14 +212,14 @@ class FirstAxis:
     cycle_ms: int | None = None
     cia408: FirstCia408 | None = None
     node: str | None = None
-    """CANopen node of a valve without CiA 408."""
+    """CANopen node, with a heartbeat, of a valve without CiA 408."""
     codes: Mapping[str, str] = field(default_factory=dict)
-    """Codes of its command, see ``NamedCodes``."""
+    """Meaning of named values (VAL_) of its command, "fault" or "value", by name."""
     timeout_known: bool = False
     """Whether the timeout comes from an EDS or was typed."""
 
     def assumed(self) -> list[str]:
-        """Return the keys of the file whose numbers are unchanged proposals."""
+        """Return the keys of the file whose numbers are unchanged proposals, and stop distances."""
         keys = [] if self.timeout_known else ["valve.timeout_ms"]
         if self.swing and self.swing.ten_swings_s == TEN_SWINGS_S:
             keys += ["sway.period_s", "sway.decay_per_swing"]
@@ -219,7 +236,7 @@ class FirstAxis:
 
 @dataclass(frozen=True)
 class FirstMachine:
-    """All answers; ``notes`` become comments at the top of the file."""
+    """All answers; ``notes`` become comments of the file; ``status``, ``identity`` are messages."""
 
     channel: str
     bitrate: int
@@ -238,7 +255,10 @@ class FirstMachine:
 
 
 def ten_swings_s() -> tuple[float, float]:
-    """Return shortest and longest time of ten swings whose PERIOD_RANGE the file may state."""
+    """Return shortest and longest time of ten swings, s, rounded inwards to tenths.
+
+    The file may state their period times each factor of PERIOD_RANGE.
+    """
     least, most = limits(Sway, "period_s")
     low, high = 10.0 * least / PERIOD_RANGE[0], 10.0 * most / PERIOD_RANGE[1]
     # Rounded inwards to tenths, so that both ends are allowed as they are written.
@@ -250,7 +270,7 @@ def stop_distance_m(
 ) -> float:
     """Return a stop distance (m) for run-on and a lost joystick, rounded up to a tenth.
 
-    It is never more than a file may state; no sensible machine needs more.
+    It is at most what a file may state; no sensible machine needs more.
 
     Args:
         full_speed_m_s: full speed of the tip.
@@ -264,5 +284,5 @@ def stop_distance_m(
 
 
 def rounded(number: float) -> str:
-    """Return a number as text, with four digits."""
+    """Return a number as text, with four significant digits."""
     return f"{number:.4g}"

@@ -25,12 +25,12 @@ from canshaper.edit.edit import plain
 
 
 def first_deployment(machine: FirstMachine) -> str:
-    """Return the text of the deployment file, with reduced speed and a filter to begin with."""
+    """Return the text of the deployment file, at reduced speed, with G_FF for axes that swing."""
     return "\n".join(_lines(machine)) + "\n"
 
 
 def _text(value: object) -> str:
-    """Return a value as YAML in one line; a text must already be YAML."""
+    """Return a value as YAML in one line, a float with six digits; a text must already be YAML."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
@@ -84,7 +84,8 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
         yield from _motion(machine.motion)
         yield ""
     if (load := machine.load) and load.message:
-        keys = {"message": load.message, "signal": load.signal, "timeout_ms": load.timeout_ms}
+        keys = {"message": load.message, "signal": load.signal, "cycle_ms": load.cycle_ms}
+        keys |= {"timeout_ms": load.timeout_ms}
         yield "# Load of the grapple. After timeout_ms of silence the axes use their own filters."
         yield f"load_state: {_flow(bus='crane', **keys, codes=_codes(load.codes))}"
         yield ""
@@ -150,9 +151,9 @@ def _joystick(joystick: FirstJoystick) -> Iterator[str]:
 
 
 def _switches(machine: FirstMachine) -> Iterator[str]:
-    """Yield the enable switches that are in another message than their joystick.
+    """Yield the section ``switches``: enable switches in another message than their joystick's.
 
-    They get cycle and timeout of the joystick.
+    They get cycle and timeout of the joystick. Without such a switch there is no section.
     """
     having = [joystick for joystick in machine.joysticks if joystick.switch]
     if not having:
@@ -217,7 +218,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int, load: FirstLoad | None) -> 
 
 
 def _schedule(swing: Stopwatch, load: FirstLoad, ten_swings_s: float) -> Iterator[str]:
-    """Yield the gain schedule: sway and filter of an empty grapple and of a log."""
+    """Yield the gain schedule: sway and filter of empty grapple and log, by value of the load."""
     yield f"    gain_schedule: # with a log ten swings in {ten_swings_s:g} s"
     with_log = replace(swing, ten_swings_s=ten_swings_s)
     for value, one in sorted([(load.empty, swing), (load.log, with_log)], key=lambda pair: pair[0]):
@@ -250,7 +251,7 @@ def _scaling(scaling: FirstScaling) -> dict[str, object]:
 
 
 def _codes(codes: Mapping[str, str]) -> dict[str, str] | None:
-    """Return the key ``codes`` of a section; None without a code."""
+    """Return the value of a key ``codes``: meanings by quoted name; None without a code."""
     return {json.dumps(name, ensure_ascii=False): means for name, means in codes.items()} or None
 
 

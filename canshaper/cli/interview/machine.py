@@ -47,7 +47,8 @@ def machine_of(
         nodes: its CANopen nodes.
 
     Raises:
-        UsageError: the messages have no joystick, or the answers leave no axis.
+        UsageError: the messages have no joystick, no axis is left, or no timeout fits a valve.
+        ConfigError: an answer of a file is invalid.
     """
     possible = suggest.joysticks(messages)
     if not messages:
@@ -89,7 +90,9 @@ def machine_of(
         load=load,
     )
     uses = uses_of(machine, messages)
-    machine = replace(machine, data_bitrate=_data_bitrate(messages, uses, bitrate))
+    used |= {*uses, machine.status, machine.identity, *(axis.status for axis in axes)}
+    used.add(((motion and motion.radius) or "").partition(".")[0])
+    machine = replace(machine, data_bitrate=_data_bitrate(messages, used, bitrate))
     if not nodes.named:
         return machine
     return replace(machine, canopen=nodes.canopen(uses))
@@ -98,7 +101,7 @@ def machine_of(
 def _meanings(
     joysticks: Sequence[FirstJoystick], axes: Sequence[FirstAxis], motion: FirstMotion | None
 ) -> set[str]:
-    """Return every signal that an answer uses, as MESSAGE.SIGNAL."""
+    """Return, as MESSAGE.SIGNAL, the signals of switches, commands, sway sensors and the radius."""
     used = {f"{one.switch or one.message}.{one.enable}" for one in joysticks}
     used |= {
         f"{one.message}.{name}" for one in joysticks for name in (one.reset, one.anti_sway_off)
@@ -109,9 +112,11 @@ def _meanings(
     return used | ({motion.radius} if motion and motion.radius else set())
 
 
-def _data_bitrate(messages: list[Message], uses: Collection[str], bitrate: int) -> int | None:
-    """Ask for the data bit rate if a used message is one of CAN FD; else return None."""
-    if not any(is_fd(message) for message in messages if message.name in uses):
+def _data_bitrate(
+    messages: list[Message], used: Collection[str | None], bitrate: int
+) -> int | None:
+    """Ask for the data bit rate, bit/s, if a used message is one of CAN FD; else return None."""
+    if not any(is_fd(message) for message in messages if message.name in used):
         return None
     most = limits(Bus, "data_bitrate")[1]
     text = "CAN FD: bit rate of the data, bit/s"
@@ -129,7 +134,10 @@ def _chosen(messages: list[Message]) -> list[str]:
 
 
 def _page(message: Message) -> tuple[Message, int | None]:
-    """Ask for the multiplexor value that is meant; return the message with it, and the value."""
+    """Ask for the multiplexor value of a joystick; return its message at that value, and the value.
+
+    A message without a multiplexor, or with several, is returned as it is, with None.
+    """
     signal = multiplexor(message)
     if signal is None:
         return message, None
@@ -199,8 +207,8 @@ def _switch_elsewhere(
 
     Returns:
         (message, signal, joystick, code). Either message and signal of the switch are given, with
-        the enabling value if the signal has more than two bits, or the joystick that shares its
-        switch. All are None without a switch.
+        the enabling value if the DBC names its values and it has more than two bits, or the
+        joystick that shares its switch. All are None without a switch.
     """
     others = [one for one in messages if one.name != message.name]
     joysticks = [joystick.name for joystick in before]

@@ -28,7 +28,8 @@ Timing = tuple[int | None, int]
 class Nodes:
     """CANopen nodes from their EDS files; asks for name, id and switches of each.
 
-    Without a file the class does not need the canopen library, which is an extra.
+    It also asks for the event timer of PDOs that have none. Without a file the class does not need
+    the canopen library, which is an extra.
 
     Args:
         files: EDS or DCF files, one for each node; a device that exists twice is listed twice.
@@ -102,11 +103,14 @@ class Nodes:
         return name if heartbeat_ms(self.named[name]) else None
 
     def timer_ms(self, message: str) -> int:
-        """Return the event timer of a PDO, ms; 0 if it has none."""
+        """Return the event timer of a message's PDO, ms; 0 if it has none, or no node has it."""
         return self._pdos[message][1].event_timer_ms or 0 if message in self._pdos else 0
 
     def cia408(self, valve: str) -> FirstCia408 | None:
-        """Return control and status word if the message commands a CiA 408 valve; else None."""
+        """Return control and status word if the message commands a CiA 408 valve; else None.
+
+        Where a node of that profile lacks one of them, it prints that.
+        """
         if (name := self.name_of(valve)) is None:
             return None
         from canshaper.commissioning.nodes import messages
@@ -128,7 +132,7 @@ class Nodes:
         return None
 
     def canopen(self, used: Collection[str]) -> FirstCanopen:
-        """Ask about our own node; return it with the nodes of the ``used`` messages."""
+        """Ask about our own node; return it and the nodes with a heartbeat and a used message."""
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
 
         ids = [node.id for node in self.named.values()]
@@ -140,7 +144,7 @@ class Nodes:
         return FirstCanopen(ours, master, nodes)
 
     def parameters(self, uses: Mapping[str, Timing]) -> "list[Parameter]":
-        """Return the parameters that have to be set in the nodes of messages with these timings."""
+        """Return what has to be set in nodes for the messages of ``uses`` and their timings."""
         if not self.named:
             return []
         from canshaper.commissioning.nodes.parameters import parameters
@@ -152,7 +156,7 @@ class Nodes:
         ]
 
     def missing(self, uses: Mapping[str, Timing]) -> Iterator[str]:
-        """Yield what the nodes of messages with these timings lack."""
+        """Yield what the nodes lack for the messages of ``uses`` and their timings."""
         if not self.named:
             return
         from canshaper.commissioning.nodes.parameters import missing
@@ -174,7 +178,7 @@ class Nodes:
 
 
 def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Timing]:
-    """Return the timing of each message that the machine uses, by name."""
+    """Return the timing of messages of joysticks, switches, valves, sensors and load, by name."""
     cycles = {message.name: message.cycle_time for message in messages}
     uses: dict[str, Timing] = {}
 
@@ -192,7 +196,7 @@ def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Tim
         if axis.sensor:
             add(axis.sensor.message, axis.sensor.timeout_ms)
     if machine.load:
-        add(machine.load.message, machine.load.timeout_ms)
+        add(machine.load.message, machine.load.timeout_ms, machine.load.cycle_ms)
     return uses
 
 
@@ -211,7 +215,7 @@ def _likely_name(stem: str, used: Collection[str]) -> str:
 
 
 def _name(used: Collection[str]) -> Callable[[str], str]:
-    """Return a parser of an unused word with which names of messages can begin."""
+    """Return a parser of an unused name of a node; the names of its messages begin with it."""
 
     def parse(text: str) -> str:
         if not (text.isidentifier() and text.isascii() and len(text) <= _NAME_LETTERS):

@@ -5,7 +5,16 @@ from collections.abc import Collection, Sequence
 
 from cantools.database.can import Message, Signal
 
-from canshaper.cli.interview.answers import MOST_OFFERED, NONE, ask, confirmed, number, one, whole
+from canshaper.cli.interview.answers import (
+    MOST_OFFERED,
+    NONE,
+    ask,
+    confirmed,
+    number,
+    one,
+    period_ms,
+    whole,
+)
 from canshaper.cli.interview.first import (
     PERIOD_RANGE,
     RADIUS_M,
@@ -44,7 +53,8 @@ _FASTEST_M_S = 40.0
 def swing_of(axis: str, period_s: float) -> Stopwatch | None:
     """Ask about the swing that an axis causes; None if it causes none.
 
-    Its valve is commanded every ``period_s`` seconds, which bounds the swing that a filter can run.
+    Its valve is commanded every ``period_s`` seconds; a swing too quick for a filter at that period
+    is not accepted.
     """
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
@@ -100,7 +110,7 @@ def sensor_of(
 
 
 def slewing_of(axis: str) -> FirstSlewing | None:
-    """Ask how fast an axis turns the crane; None if it does not turn it."""
+    """Ask how fast an axis turns the crane, and its largest radius; None if it does not turn it."""
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
@@ -113,9 +123,10 @@ def slewing_of(axis: str) -> FirstSlewing | None:
 
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:
-    """Return shortest and longest time of ten swings for which a filter runs at a valve's period.
+    """Return shortest and longest time of ten swings, s, for which a filter runs.
 
-    The filter must also run at the shortest swing that may be set on the running machine.
+    The filter must also run at the shortest swing that may be set on the running machine. If no
+    swing fits, the times that a file may state are returned. ``period_s``: between two commands.
     """
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s
@@ -127,7 +138,7 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
 
 def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | None:
-    """Ask about slew and near-far as one motion; None without both.
+    """Ask about slew and near-far as one motion; None without both, or if it is declined.
 
     ``others`` are the messages that may carry the measured radius.
     """
@@ -154,13 +165,16 @@ def motion_of(axes: list[FirstAxis], others: list[Message]) -> FirstMotion | Non
 
 # Proposals for a log: factor on the time of ten swings, and kg, as in forwarder-load.yaml.
 _SLOWER, _LOG_KG = 1.14, 600.0
-_CYCLES, _CYCLE_MS = 5, 200  # cycles in its proposed timeout; cycle if the DBC has none
+_CYCLES, _CYCLE_MS = 5, 200  # cycles in its timeout; its proposed cycle if the DBC has none
 
 
 def load_of(
     axes: Sequence[FirstAxis], messages: Sequence[Message], used: Collection[str]
 ) -> FirstLoad | None:
-    """Ask which signal says that a log is gripped; without one, if one response holds for both.
+    """Ask which signal says that a log is gripped.
+
+    If there is none, ask whether one response is to hold for an empty grapple and a log; None if
+    not, or if no axis swings.
 
     Args:
         axes: axes of the machine.
@@ -181,16 +195,17 @@ def load_of(
         return FirstLoad(_with_log(swinging)) if confirmed(text, default=False) else None
     message, signal = signals[answer]
     empty, log = _values(signal)
-    timeout_ms = _CYCLES * (message.cycle_time or _CYCLE_MS)
+    cycle = message.cycle_time or period_ms(message.name, _CYCLE_MS)
+    own = None if message.cycle_time else cycle
     codes = code_meanings(signal)
-    swings = _with_log(swinging)
-    return FirstLoad(swings, message.name, signal.name, timeout_ms, empty, log, codes)
+    of_signal = message.name, signal.name, _CYCLES * cycle, empty, log, codes, own
+    return FirstLoad(_with_log(swinging), *of_signal)
 
 
 def _possible(
     messages: Sequence[Message], used: Collection[str]
 ) -> tuple[dict[str, tuple[Message, Signal]], list[str]]:
-    """Return the signals that may carry the load state, and those of them with such a name."""
+    """Return the unused signals that can say that a log is gripped, and names of likely ones."""
     signals = {
         f"{message.name}.{signal.name}": (message, signal)
         for message, signal in suggest.loads(messages)
@@ -200,7 +215,7 @@ def _possible(
 
 
 def _values(signal: Signal) -> tuple[float, float]:
-    """Ask for the values of a signal with an empty grapple and with a log."""
+    """Ask for the values of a signal with an empty grapple and with a log; return (empty, log)."""
     if signal.length <= suggest.SWITCH_BITS:
         log = ask(f"  {signal.name}: its value while a log is gripped", whole(0, 1), "1")
         return 1.0 - log, float(log)
@@ -232,7 +247,7 @@ def _with_log(axes: Sequence[FirstAxis]) -> dict[str, float]:
 def code_meanings(signal: Signal, scaling: FirstScaling | None = None) -> dict[str, str]:
     """Ask whether named values (VAL_) whose names leave it open are faults or measurements.
 
-    ``scaling`` are the corrections of the signal from earlier answers.
+    ``scaling`` has corrections from earlier answers. Returned is "fault" or "value" by name.
     """
     if scaling:
         given = Scaling(full=scaling.full, zero=scaling.zero, invert=scaling.invert)

@@ -1,1 +1,1 @@
-"""One module a verb: its function of the same name is the command. Found here, listed nowhere."""
+"""One module for each verb, found by its name: the function of the same name is the command."""

@@ -144,7 +144,7 @@ def _conclude(
     drive: "CalibrationDrive",
     origin: dict[str, Any] | None,
 ) -> None:
-    """Show the curve of one valve; write it into the file with its origin, if there is one."""
+    """Show the curve of one valve; with an ``origin`` write both into the deployment file."""
     from canshaper.commissioning.calibration.fit import curve_lines, write_curve
     from canshaper.commissioning.origins import written_line
 
@@ -169,7 +169,7 @@ def _conclude(
 
 
 def _confirm(axes: Sequence[str], drive: "CalibrationDrive") -> None:
-    """Ask whether the axes may move by themselves; end the verb where they may not."""
+    """Ask whether the axes may move by themselves; raise Abort, which ends the verb, if not."""
     who = f"Axes {' and '.join(axes)}, alone, then at once," if len(axes) > 1 else f"Axis {axes[0]}"
     ramp = drive.ramp
     typer.confirm(

@@ -163,7 +163,10 @@ def _drive(workers: "Engine", sources: "list[Source]", seeds: range, stores: "li
 
 
 def _report(files: "list[Deployment]", stores: "list[Store]", results: "Results") -> bool:
-    """Print and write the results; return whether the first file's limits accept them all."""
+    """Print and write the results; return whether the first file's limits accept them all.
+
+    A file without a drive ends it, and is not accepted.
+    """
     from canshaper.campaign.statistics import differences
     from canshaper.campaign.summary import difference_table, lines, summarise, tables
 

@@ -85,7 +85,7 @@ def check(
 
 
 def _as_dict(deployment: "Deployment") -> dict[str, Any]:
-    """Return all results as plain data; travel is in seconds of full speed."""
+    """Return all results of a good deployment for --json; travel in seconds of full speed."""
     from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import stopping
     from canshaper.design.tuning.verdict import verdicts
@@ -131,7 +131,7 @@ def _as_dict(deployment: "Deployment") -> dict[str, Any]:
 
 
 def _print(deployment: "Deployment") -> None:
-    """Print all results."""
+    """Print all results of a good deployment, warnings last."""
     from canshaper.commissioning.likely_mistakes import warnings_of
     from canshaper.commissioning.stopping import print_stopping
     from canshaper.design.tuning.verdict import verdicts
@@ -216,7 +216,7 @@ def _print_codes(codes: "Sequence[NamedCode]") -> None:
 
 
 def _match(bus: "Bus") -> str:
-    """Return in words whether ``match`` of a bus holds on this machine, or a warning."""
+    """Return in words whether ``match`` of a bus holds here, or why it could not be looked at."""
     from canshaper.bus.device import match_fault, whereabouts
 
     try:
@@ -245,7 +245,7 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
 
 
 def _pendulums(deployment: "Deployment", axis: str) -> "Iterator[str]":
-    """Yield for each filter its range of pendulum lengths, and the swing left at both ends.
+    """Yield for each filter its range of pendulum lengths, m, and the swing left at both ends, %.
 
     The range is that of its design, else that from which a campaign draws.
     """
@@ -271,7 +271,7 @@ def _pendulums(deployment: "Deployment", axis: str) -> "Iterator[str]":
 
 
 def _load(deployment: "Deployment", bus: str) -> str:
-    """Return the load of a bus by its messages, in words."""
+    """Return the load of a bus by its messages, in words, with a warning above 50 %."""
     from canshaper.machine.buses import BUSY
 
     load = deployment.load(bus)

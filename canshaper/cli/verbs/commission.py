@@ -117,7 +117,7 @@ def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: b
 
     Args:
         files: files of the procedure.
-        words: how to reach the daemon of the machine.
+        words: bus options with which the daemon of the machine is started.
         changes: how the simulated crane differs; empty: as when the rehearsal began.
         simulated: whether this is a rehearsal.
     """
@@ -144,7 +144,7 @@ def _procedure(
 
 
 def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
-    """Print the status of every step."""
+    """Print the status of every step that this machine has."""
     from canshaper.commissioning.procedure.procedure import STEPS
     from canshaper.commissioning.procedure.state import State, read_state
     from canshaper.report.console import SafeConsole, new_table
@@ -160,7 +160,7 @@ def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
 
 
 def _lead(procedure: "Procedure", name: str | None) -> None:
-    """Lead through the step of that name, or through every open step."""
+    """Lead through the step of that name, or through every open step; say if all are done."""
     step = procedure.step(name) if name else procedure.next_open()
     while step:
         _one(procedure, step)
@@ -170,7 +170,7 @@ def _lead(procedure: "Procedure", name: str | None) -> None:
 
 
 def _one(procedure: "Procedure", step: "Step") -> None:
-    """Run one step until the person accepts or skips it.
+    """Run one step, again on demand, until the person accepts or skips it.
 
     Raises:
         typer.Exit: the person stops; the step stays open.
@@ -231,7 +231,7 @@ class Prompts:
 
     @contextmanager
     def progress(self, what: str) -> Iterator["OnProgress"]:
-        """Show a bar on the terminal."""
+        """Show a bar on the terminal; yield the function that moves it."""
         from canshaper.report.console import progress_bar
 
         with progress_bar(what) as on_progress:

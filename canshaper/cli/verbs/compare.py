@@ -135,7 +135,6 @@ def compare(
         results.print(shown)
     for _, why in advice.values():
         results.print(f"- {why}.")
-    end_interrupted(interrupted)
 
     def figure() -> "Figure":
         from canshaper.report.pareto import Point
@@ -149,6 +148,7 @@ def compare(
     title = f"{calm.name} leaves {calm.worst_30_deg:.1f}° of {off.worst_30_deg:.1f}° at worst"
     results.picture_line(results.picture(out / "compare.png", figure))
     results.write()
+    end_interrupted(interrupted)
 
 
 def _ropes(
@@ -203,7 +203,7 @@ def _for_fleet(deployment: "Deployment", processes: int | None) -> "list[Candida
 def _work(
     deployment: "Deployment", filters: "list[Candidate]", seeds: int, processes: int | None
 ) -> "tuple[Table, dict[str, Any], str]":
-    """Return seconds a move with each filter: table, data, and the task that Ctrl-C interrupted."""
+    """Return seconds a move with each filter: table, data, and where Ctrl-C ended it, or ""."""
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp
     from canshaper.campaign.work_results import OFF, TASKS, as_data, at_work, choice
@@ -219,7 +219,7 @@ def _work(
 
 
 def _residuals(table: "list[Row]") -> "Table":
-    """Return a table of the largest swing left, by kind of work."""
+    """Return a table of the largest swing left, degrees, by kind of work."""
     from canshaper.report.console import new_table
 
     drawn = new_table("left, deg", *_WORKS)
@@ -248,7 +248,7 @@ def _felt(table: "list[Row]") -> "Table":
 
 
 def _worst(table: "list[Row]") -> "Table":
-    """Return a table with the wrong length: worst case of a filter, and which of ours beats it."""
+    """Return a table of the most swing left with wrong lengths, and which of ours beats that."""
     from canshaper.design.comparison.summary import beaten_by
     from canshaper.report.console import new_table
 
@@ -262,7 +262,7 @@ def _worst(table: "list[Row]") -> "Table":
 
 
 def _limits(limits: "list[Least]") -> "Table":
-    """Return a table of limits that no shaper of near-far can beat, by duration."""
+    """Return a table of the least swing, %, that any shaper of near-far leaves, by its duration."""
     from canshaper.report.console import new_table
 
     heads = ("ours\n±15 %", "no dip\n±15 %", "any\n±15 %", "no dip\n±30 %")

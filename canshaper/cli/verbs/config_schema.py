@@ -65,7 +65,7 @@ def checksum_table() -> Iterator[str]:
     """Yield the lines of the table of all checksum kinds, in Markdown.
 
     Raises:
-        ValueError: a package is wrong, see ``known_checksum``.
+        ValueError: the checksum of a package cannot be loaded, or two packages have its name.
     """
     from canshaper.checksums.kinds import CHECKSUMS, checksum_names, known_checksum
 

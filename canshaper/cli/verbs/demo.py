@@ -91,8 +91,8 @@ def demo(
     several cranes, it drives the first one.
 
     Operator, daemon and plant run as three processes. They exchange frames on vcan0 if the kernel
-    has it, else on python-can's udp_multicast. With --plant they run in lock-step, without a bus.
-    It prints a table and writes demo.png and report.json.
+    has it, else on python-can's udp_multicast. With --lockstep, --seed or --plant, and outside
+    Linux, there is no bus. It prints a table and writes demo.png and report.json.
 
     Examples:
 
@@ -181,7 +181,7 @@ def _drawn(
     nominal: "CraneParameters",
     plant: Path | None,
 ) -> "Setting":
-    """Draw a drive of a campaign of this file, or of one of ``ranges`` ``--against`` this file."""
+    """Return the drive that a campaign of ``ranges``, else of this file, draws for a seed."""
     from canshaper.campaign.draw import check_same_axes, draw_drive, on_unit
 
     first = loader(ranges)() if ranges else deployment
@@ -198,7 +198,7 @@ def _driven(
     changes: list[str],
     export: Path | None,
 ) -> tuple["Recording", "Recording", int]:
-    """Drive twice and export the second drive; end the verb with one line if a drive fails."""
+    """Drive twice, and export the second drive if asked; a failed drive or Ctrl-C ends the verb."""
     from canshaper.recording.export import exporting
 
     try:

@@ -27,8 +27,8 @@ def gateway(
 ) -> None:
     """Set up, show or remove the rules of can-gw that pass frames between the buses of a gateway.
 
-    It removes other rules between the two interfaces, and lists them. The service calls it before
-    the daemon starts (running) and after the daemon has ended for any reason (away).
+    Except with show it removes other rules between the two interfaces, and lists them. The service
+    calls it before the daemon starts (running) and after it has ended for any reason (away).
 
     Exit code 0 when the rules are set, or with show when they are those of running or away; 1 when
     show finds others; 2 when the file is wrong; 3 when the kernel refuses.
@@ -69,10 +69,10 @@ def gateway(
 
 
 def _look_at_devices(deployment: "Deployment") -> None:
-    """Check that each interface of a rule is the device that its bus has to match.
+    """Check that the interfaces of the gateway are the devices that ``match`` of their buses names.
 
     Raises:
-        BusError: it is another device, or the device cannot be examined.
+        BusError: one is another device, or cannot be examined.
     """
     from canshaper.bus.device import match_fault
 

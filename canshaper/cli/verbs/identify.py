@@ -126,9 +126,12 @@ def identify(
         refuse_shipped(file)
     results = Results(TITLES[together], deployment, report, picture, quiet=as_json, soft_wrap=True)
     options: dict[str, Any] = {"axis": axis, "channel": channel, "about_s": about_s}
+    timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
+    by_hand = {name: value for name, value in timed.items() if value is not None}
     if logs and Path(logs[0]).is_dir():
         folders = [*map(Path, logs)]
-        check_only_folders(folders, {"--write": write, "--json": as_json, "--picture": picture})
+        of_one = {"--write": write, "--json": as_json, "--picture": picture, "--together": together}
+        check_only_folders(folders, of_one | dict.fromkeys(by_hand, True))
         work = partial(identified, file, signal or [], dbc or [], options)
         run_fleet(engine(processes, scheduler), work, folders, show_periods, out, results)
         return
@@ -139,8 +142,7 @@ def identify(
         results.conclude(lambda to: to.print("\n".join(pump)))
         return
     with os_errors(out):
-        timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
-        if any(v is not None for v in timed.values()):
+        if by_hand:
             findings = [timed_by_hand(timed, logs or [], axis_named(axis, deployment))]
         else:
             named = signals_named(signal or [], deployment), deployment
@@ -161,7 +163,7 @@ def _conclude(
     path: Path,
     as_json: bool,
 ) -> None:
-    """Show what the logs showed; write it into the file with its origin, if there is one."""
+    """Show what the logs showed; with an ``origin`` write both into the deployment file."""
     from canshaper.commissioning.identification.report import as_dict, headlines, write_sway
 
     seen = [one for one in findings if one.free or one.driven]
@@ -197,7 +199,7 @@ def _pump(
     channel: str | None,
     write: bool,
 ) -> list[str]:
-    """Return the flow of the pump as lines, from logs of two axes; write it into the file too."""
+    """Return the flow of the pump as lines, from logs of two axes; with ``write`` also write it."""
     from canshaper.commissioning.calibration.pump import drives_in, pair_of, pump_lines
     from canshaper.commissioning.identification.data import measured_in, paths_of, signals_named
 
@@ -224,7 +226,7 @@ def _print(
 def _next_steps(
     advice: Sequence["Advice"], deployment: "Deployment", written: Sequence[str]
 ) -> list[str]:
-    """Return what was written, and the command that designs the filter of each axis again."""
+    """Return lines that say what was written, and which command designs each filter again."""
     from canshaper.commissioning.origins import written_line
     from canshaper.shaping.registry import KINDS
 

@@ -57,7 +57,7 @@ def init(
 
     The file has reduced speed. Each axis that swings gets a robust shaper (without SciPy a G_FF for
     a start). Slew and near-far become one motion, which is off until the step motion of commission
-    is done. Numbers that init has guessed are listed under assumed.
+    is done. Numbers that init has guessed are listed under assumed, but for those with a log.
 
     Ctrl-C writes nothing. If the check of the whole file finds a fault, such as a missing enable
     switch, the answers are kept in a draft next to it. For a J1939 machine begin with a copy of the
@@ -137,7 +137,7 @@ def init(
 
 
 def _confirmed(machine: "FirstMachine", parameters: "Sequence[Parameter]") -> bool:
-    """Return whether to write the parameters; on a real bus ask the person first."""
+    """Return whether to write the parameters, if any; on a real bus ask the person first."""
     if not parameters:
         return False
     where = f"{machine.interface} channel {machine.channel}"
@@ -213,8 +213,7 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
 def _write(file: Path, draft: Path, text: str) -> None:
     """Write the text as a draft and load it; rename it to the file only if it is valid.
 
-    Raises:
-        UsageError: the draft is wrong; it is kept.
+    A draft with a fault is kept and raises a UsageError.
     """
     from canshaper.machine.binding import load_deployment
 

@@ -96,7 +96,7 @@ def profiles(
 
 
 def _too_short(deployment: "Deployment") -> Iterator[str]:
-    """Yield a fault for each filter whose response is too short: less than half a swing."""
+    """Yield a fault for each filter that calms a swing but is over before half a swing."""
     from canshaper.design.tuning.evaluate import Machine, evaluate, shaper_of
     from canshaper.machine.filters import every_filter
     from canshaper.shaping.registry import KINDS
@@ -119,9 +119,9 @@ def _too_short(deployment: "Deployment") -> Iterator[str]:
 def _work(
     deployment: "Deployment", changes: list[str], seeds: int, processes: int | None
 ) -> "tuple[dict[str, Any], Table, list[str], str]":
-    """Return the seconds a move by task and profile: data, table, faults, and where it was stopped.
+    """Return the seconds a move by task and profile, as data and table, faults, and an end.
 
-    A profile that is slower than off is a fault; "" says that Ctrl-C stopped nothing.
+    A profile that is slower than off is a fault. The end says where Ctrl-C interrupted, else "".
     """
     from canshaper.campaign.run import Source
     from canshaper.campaign.work import SetUp

@@ -122,7 +122,7 @@ def record(
 
 
 def _last(file: str, control: Path | None) -> None:
-    """Let the running daemon write its black box."""
+    """Let the running daemon write its black box, wait for that, and print where it is."""
     from canshaper.commissioning.control_client import write_black_box
 
     try:
@@ -135,13 +135,7 @@ def _last(file: str, control: Path | None) -> None:
 
 
 def _log_of(out: Path) -> Path:
-    """Make an empty log next to a bundle, such as drive.x2k9.log, and return its path.
-
-    It is not drive.log, which may be another recording.
-
-    Raises:
-        OSError: the file cannot be made.
-    """
+    """Make an empty log with a new name next to a bundle, such as drive.x2k9.log; return it."""
     with tempfile.NamedTemporaryFile(
         dir=out.parent, prefix=f"{out.stem}.", suffix=".log", delete=False
     ) as log:
@@ -155,7 +149,10 @@ def _bundle(
     out: Path,
     failure: CanshaperError | None,
 ) -> None:
-    """Pack log, deployment and facts into the bundle; on failure keep the log and name it."""
+    """Pack log, deployment and facts into ``out``; if that fails, print where the log is and exit.
+
+    ``failure`` is what ended the recording early, if anything.
+    """
     from canshaper.recording.record import pack
 
     facts = {

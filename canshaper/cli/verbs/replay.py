@@ -142,7 +142,7 @@ def _fleet(
     workers: tuple[int | None, str | None],
     results: "Results",
 ) -> None:
-    """Replay every log of a folder, and print one table of all."""
+    """Replay every log in a folder and below with each deployment, and print tables of all."""
     from canshaper.cli.log_folders import replayed, run_fleet, show_replays
 
     if not configs:
@@ -166,7 +166,10 @@ def _run(
     inside: Path | None,
     export: Path | None = None,
 ) -> "list[Replayed]":
-    """Replay the log with every deployment, one after the other."""
+    """Replay the log with every deployment, one after the other.
+
+    ``inside``: folder of an unpacked bundle, whose deployment reads no DBC file elsewhere.
+    """
     from canshaper.recording.replay import look
     from canshaper.recording.report import Replayed
     from canshaper.report.console import progress_bar
@@ -192,7 +195,7 @@ def _one(
     export: Path | None,
     on_progress: Callable[[float], None],
 ) -> "Replayed":
-    """Replay the log with one deployment, and write its frames and its events."""
+    """Replay the log with one deployment; write the frames it sends and its events into ``out``."""
     from canshaper.recording.export import exporting
     from canshaper.recording.replay import Replay
     from canshaper.recording.report import Replayed, Trace

@@ -163,7 +163,10 @@ def for_fleet(
     report: Path | None,
     picture: Path | None,
 ) -> None:
-    """Design filters of a kind for a fleet, of all swinging axes, print and write them."""
+    """Design the filters of all swinging axes for a fleet, and print them; ``write`` them if asked.
+
+    ``kind`` is robust or gff; ``duration_s`` the length of their responses, None: by the file.
+    """
     from canshaper.campaign.fleet import design_fleet
     from canshaper.campaign.fleet_candidates import figure, table, verdict, write_fleet
     from canshaper.cli.results import Results
@@ -194,7 +197,7 @@ def for_fleet(
 
 
 def _lengths(text: str | None) -> tuple[float, float] | None:
-    """Return the shortest and the longest pendulum of the option --lengths, m."""
+    """Return the shortest and the longest pendulum of the option --lengths, m; None without it."""
     if text is None:
         return None
     try:

@@ -97,7 +97,7 @@ def _import_can() -> None:
 
 
 def _log_folder() -> Path | None:
-    """Return the log folder that systemd gives the service (systemd.exec(5), LogsDirectory=)."""
+    """Return the first log folder (LogsDirectory=) that systemd gives the service, if any."""
     first = os.environ.get("LOGS_DIRECTORY", "").split(":")[0]
     return Path(first) if first else None
 
@@ -105,7 +105,12 @@ def _log_folder() -> Path | None:
 def _changed(
     load: "Callable[[], Deployment]", *, listen_only: bool, simulated: bool, control: str | None
 ) -> "Callable[[], Deployment]":
-    """Return a loader that checks the deployment and applies these options to it."""
+    """Return a loader that applies these options, and refuses what may not run with a ConfigError.
+
+    Refused are, without ``listen_only``, an axis with a long stop but no stop_distance_m and,
+    without ``simulated``, the curve of a simulated crane for a valve on a real bus; and a
+    ``control`` socket for a file without a section control.
+    """
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError, Problem
     from canshaper.machine.stop_distance import rehearsed_valves, unstated

@@ -122,7 +122,7 @@ def sensor(
 
 
 def _axes(deployment: "Deployment", axis: str | None) -> list[str]:
-    """Return the axes that are examined."""
+    """Return ``axis``, or all axes with a sway sensor; UsageError if there is no sensor."""
     having = [name for name, one in deployment.axes.items() if one.sway_sensor]
     if not having:
         text = "expected an axis with a sway_sensor, got none; see docs/sensor.md"
@@ -136,7 +136,7 @@ def _axes(deployment: "Deployment", axis: str | None) -> list[str]:
 
 
 def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
-    """Record the buses until the time is over, or Ctrl-C."""
+    """Record the buses into the log until the seconds are over, or until SIGTERM or Ctrl-C."""
     from rich.live import Live
 
     from canshaper.recording.record import Recording
@@ -153,7 +153,7 @@ def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
 
 
 def _simulate(deployment: "Deployment", axes: Sequence[str], log: Path, changes: list[str]) -> None:
-    """Drive the simulated crane."""
+    """Let a hand drive these axes of the simulated crane, and write the log."""
     from canshaper.commissioning.procedure.bench import log_simulated
     from canshaper.commissioning.sensor.fit import hand_driven
     from canshaper.report.console import progress_bar

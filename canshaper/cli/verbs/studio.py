@@ -175,7 +175,7 @@ def _machine(
 ) -> "Stage":
     """Return a stage that listens to a machine; ``adjust`` lets the page change its numbers.
 
-    ``adjust`` holds the control socket; None in it means that of the file.
+    ``adjust`` has one member, the path of the control socket, None for that of the file.
     """
     from canshaper.studio.stage import Stage
 
@@ -195,7 +195,7 @@ def _cranes(
     changes: list[str],
     crane: str | None,
 ) -> "Stage":
-    """Return a stage with simulated cranes; of a file with several, the first crane is driven."""
+    """Return a stage with simulated cranes; of a file with several, ``crane`` or the first."""
     from canshaper.studio.crane import copied
     from canshaper.studio.stage import Stage
     from canshaper_sim.cranes import cranes
@@ -223,7 +223,12 @@ def serve(
     make: "Callable[[Access], ASGIApp]",
     stage: "Stage | None" = None,
 ) -> None:
-    """Serve a page until Ctrl-C; ``make`` builds the page from the rules of access."""
+    """Print the address of a page, and serve it until Ctrl-C or until the stage ends.
+
+    ``make`` builds the page from the rules of access. A host beyond loopback, and a stage whose
+    numbers may change, need a token. ``stage`` starts here and ends with ``stack``. An address
+    that is taken ends the verb.
+    """
     from canshaper.commissioning.doctor.processes import before_the_rest
     from canshaper.studio.access import Access, qr_code, reachable
     from canshaper.studio.server import address, listening, server
@@ -259,7 +264,7 @@ def serve(
 
 
 def _transports(interface: str | None, channels: list[str]) -> list["Transport"]:
-    """Return the buses of the simulated cranes.
+    """Return the buses of the simulated cranes: the first two channels, else two of udp_multicast.
 
     Raises:
         UsageError: there is no such channel, or the joysticks might move a real machine on it.
@@ -283,5 +288,5 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
 
 
 def interrupt(_number: int, _frame: FrameType | None) -> None:
-    """Handle a signal as Ctrl-C."""
+    """Handle a signal as Ctrl-C: raise KeyboardInterrupt."""
     raise KeyboardInterrupt

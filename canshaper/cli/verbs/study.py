@@ -125,7 +125,11 @@ def study(
 
 
 def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
-    """Return the key of the study; make it for a new study."""
+    """Return the key of the study, which says what each letter stands for; make a missing one.
+
+    ``about`` are the parameters of the task. Files that cannot be compared are a UsageError, as is
+    a key of other settings or of another task.
+    """
     from canshaper.studio.study import KEY, Key
     from canshaper_sim.parameters import changed_parameters
 
@@ -146,7 +150,7 @@ def _key(folder: Path, file: str, other: str, about: dict[str, Any]) -> "Key":
 
 
 def _settings(key: "Key", file: str, other: str, copies: Path) -> "dict[str, Deployment]":
-    """Return the deployment behind each letter."""
+    """Return the deployment of each letter of the key; that of raw is ``file`` without filters."""
     from canshaper.studio.study_stage import setting
 
     by_name = {_RAW: setting(deployment_path(file), copies, raw=True)}
@@ -167,7 +171,11 @@ def _table(folder: Path, person: str, key: "Key") -> "Table":
 
 
 def _join(folder: Path, unseal: bool) -> None:
-    """Print the results of all complete persons, and how many persons a change needs."""
+    """Print the results of all complete persons, and how many persons a change needs.
+
+    The results, of three persons or more, are also in study.html. ``unseal`` names the settings,
+    and keeps in study.opened when it first did.
+    """
     from canshaper.cli.results import Results
     from canshaper.studio import study_results as results
     from canshaper.studio.study import KEY, LETTERS, mark_of, read_key

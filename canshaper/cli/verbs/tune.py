@@ -164,7 +164,7 @@ def tune(
 
 
 def _numbers(text: str | None) -> list[float] | None:
-    """Parse the numbers of --q."""
+    """Return the numbers of --q, None without it; UsageError where a word is no number."""
     try:
         return None if text is None else [float(word) for word in text.split(",")]
     except ValueError:

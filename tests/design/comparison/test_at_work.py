@@ -58,7 +58,9 @@ def test_each_filter_has_its_seconds_a_move(run: Any) -> None:
     assert off[1::3] == [f"{work[name]['off']['empty']:.1f}" for name in work]
 
 
-def test_ctrl_c_leaves_what_is_done_until_then(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_leaves_what_is_done_until_then(
+    run: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     class Interrupted:
         """An engine that Ctrl-C interrupts in the second working cycle."""
 
@@ -70,8 +72,10 @@ def test_ctrl_c_leaves_what_is_done_until_then(run: Any, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(compare, "engine", lambda *_: Interrupted())
     monkeypatch.setattr(work_results, "learn", lambda *_: ())
-    done, work = run("--seeds", "2")
+    report = tmp_path / "report.html"
+    done, work = run("--seeds", "2", "--report", str(report))
     assert done.exit_code == 130
+    assert "7.0 / 7.0" in report.read_text(encoding="utf-8")
     assert work == {"loading": {n: {"empty": 7.0, "log": 7.0} for n in ("off", "ZV", ROBUST)}}
     assert "interrupted at 30 cm, 6 deg: 1 of 2 working cycles are done" in done.output
     assert "7.0 / 7.0" in done.output
