@@ -45,7 +45,7 @@ def test_residuals(outcomes: list[Outcome]) -> None:
     works = dict.fromkeys(o.work for o in outcomes)
     worst = [max(o.residual_deg for o in outcomes if o.work == work) for work in works]
     given = dict(zip(_WORKS.values(), cells("left, deg", ROBUST), strict=True))
-    assert given == dict(zip(works, (f"{deg:.2f}" for deg in worst), strict=True))
+    assert given == dict(zip(works, (f"{deg:.{1 + (deg < 9.995)}f}" for deg in worst), strict=True))
 
 
 @pytest.mark.slow
@@ -53,9 +53,9 @@ def test_what_is_felt(outcomes: list[Outcome]) -> None:
     slew, near_far = (o for o in outcomes if o.work == "pulse")
     felt = (near_far.rise_s, near_far.stop_s, near_far.run_on_m, slew.run_on_m)
     row = cells("felt", ROBUST)
-    assert row[:4] == [f"{value:.2f}" for value in felt]
+    assert row[1:5] == [f"{value:.2f}" for value in felt]
     assert row[6] == f"{max(o.peak_deg for o in outcomes if o.work == 'both'):.1f}"
-    assert row[8] == str(max(o.movements or 0 for o in outcomes))
+    assert row[7].partition("/")[2] == str(max(o.movements or 0 for o in outcomes))
 
 
 @pytest.mark.slow
