@@ -71,7 +71,10 @@ class Verdict:
         text = f"{self.word}: {100.0 * self.left:.1f} % of the swing is left at {at}"
         if self.word == "good":
             return text
-        cures = "; ".join(self.cures) or "neither tail nor valve help: design it again"
+        cures = (
+            "; ".join(self.cures)
+            or "tail, valve and stopping distance do not help: design it again"
+        )
         return f"{text}, expected {100.0 * GOOD:g} % or less; {cures}"
 
 
@@ -103,6 +106,8 @@ def judge(
         other = replace(machine, limits=replace(machine.limits, **changed))
         return evaluate(mode, tick_s, shaper_for, other, (worst.length_pct,)).worst(100.0)
 
+    if math.isfinite(machine.limits.run_on):
+        verdict = verdict.with_cure(left_with(run_on=math.inf), "a stop_distance_m long enough")
     best, what = math.inf, ""
     for words, rates in _faster(machine):
         best, what = min((best, what), (left_with(**rates), words))

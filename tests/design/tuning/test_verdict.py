@@ -76,7 +76,7 @@ def test_a_filter_that_never_moves_is_not_called_calm() -> None:
     """Its first steps are less than half a step of the valve frame; nothing helps."""
     text = str(judge(MODE, 0.02, gff((-0.1, -0.1)), machine()))
     assert text.startswith("useless: 100.0 % of the swing is left at the right length")
-    assert text.endswith("; neither tail nor valve help: design it again")
+    assert text.endswith("; tail, valve and stopping distance do not help: design it again")
 
 
 def test_a_tool_that_swings_out_by_itself_needs_no_filter() -> None:
@@ -180,8 +180,12 @@ def test_check_warns_of_a_filter_that_does_not_damp(file: Path) -> None:
 
 def test_a_stopping_distance_that_ends_the_run_on_is_seen(file: Path) -> None:
     changed(file, "stop_distance_m: 1 }", "stop_distance_m: 0.6 }")
-    left = {place[1]: one.left for place, one in verdicts(load_deployment(file))}
-    assert left["slew"] < GOOD < left["near_far"]
+    near_far = {place[1]: one for place, one in verdicts(load_deployment(file))}["near_far"]
+    changed(file, "stop_distance_m: 0.6 }", "stop_distance_m: 5 }")
+    slew, free = (one for _, one in verdicts(load_deployment(file)))
+    assert max(slew.left, free.left) < GOOD < near_far.left
+    left = f"would leave {100 * free.left:.1f} %"
+    assert near_far.cures[-1] == f"a stop_distance_m long enough {left}"
 
 
 def test_a_profile_is_judged_too() -> None:
