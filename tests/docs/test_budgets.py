@@ -20,7 +20,7 @@ TABLES = re.compile(r"^<!-- (generated|measured): (.*?) -->$.*?^<!-- end: \2 -->
 OUTPUT = re.compile(r"^<!-- canshaper .*? -->\n```text\n.*?^```$", re.M | re.S)
 BUDGET = {
     "CHANGELOG.md": 610,
-    "CONTRIBUTING.md": 580,
+    "CONTRIBUTING.md": 590,
     "README.md": 570,
     "SECURITY.md": 340,
     "docs/api.md": 130,
@@ -51,7 +51,7 @@ BUDGET = {
     "docs/states.md": 270,
     "docs/studio.md": 600,
     "docs/study.md": 280,
-    "docs/testing.md": 420,
+    "docs/testing.md": 400,
     "docs/topologies.md": 640,
     "docs/troubleshooting.md": 530,
     "docs/tuning.md": 550,
@@ -63,7 +63,7 @@ BUDGET = {
 LINES = {
     "canshaper/gate": (2_250, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (5_000, "the method: filters, axis, motion, ends, observer of the sway"),
-    "canshaper": (67_000, "a new ability takes the room of an old one"),
+    "canshaper": (67_300, "a new ability takes the room of an old one; docstrings tell every case"),
     "tests": (100_500, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.

@@ -18,7 +18,8 @@ from tools.frame_faults import FAULT_TEXTS, TRUST_TEXTS
 ROOT = Path(__file__).parents[2]
 generate: dict[str, Any] = runpy.run_path(str(ROOT / "tools/generate.py"))
 GENERATED: dict[Path, str] = generate["generated"](ROOT)
-ADDED = IntEnum("Reason", {**{one.name: int(one) for one in Reason}, "HOSE_BURST": 74})  # type: ignore[misc]
+LAST = max(Reason)
+ADDED = IntEnum("Reason", {**{one.name: int(one) for one in Reason}, "HOSE_BURST": LAST + 1})  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("path", GENERATED, ids=[path.name for path in GENERATED])
@@ -46,10 +47,14 @@ def test_every_status_of_a_dbc_has_the_tables_of_the_program(path: Path) -> None
 def test_a_reason_that_is_added_reaches_dbc_and_page() -> None:
     text = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="utf-8")
     new = generate["with_value_tables"](text, {"Reason": ADDED})
-    assert new.count('74 "HOSE_BURST" ;') == text.count('73 "OUTPUT_REFUSED" ;')
-    texts = {**REASON_TEXTS, 74: ReasonText("a hose burst", "no pressure", "a new hose", fmi=7)}
+    last = f'{LAST:d} "{LAST.name}" ;'
+    assert new.count(f'{LAST + 1} "HOSE_BURST" ;') == text.count(last) > 0
+    texts = {
+        **REASON_TEXTS,
+        LAST + 1: ReasonText("a hose burst", "no pressure", "a new hose", fmi=7),
+    }
     rows = list(generate["reason_rows"](ADDED, texts))
-    assert rows[-1] == "| 74 | HOSE_BURST | no pressure | a new hose | 7 |"
+    assert rows[-1] == f"| {LAST + 1} | HOSE_BURST | no pressure | a new hose | 7 |"
     page = "a\n<!-- generated: reasons -->\nLAST YEAR\n<!-- end: reasons -->\nb\n"
     written = generate["with_sections"](page, {"reasons": rows})
     assert rows[-1] in written
