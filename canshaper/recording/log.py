@@ -245,8 +245,8 @@ def _format(place: Place) -> tuple[bool, str]:
     suffix = f".{suffix.rpartition('.')[2]}"
     form = FORMATS.get(suffix)
     if form is None or (packed and not form.packs):
-        known = ", ".join(FORMATS)
-        got = repr(suffix) if suffix != "." else "none"
-        expected = f"the suffix {known}, each also with .gz behind"
+        whole = " and ".join(name for name, one in FORMATS.items() if not one.packs)
+        got = repr(suffix + ".gz" * packed) if suffix != "." else "none"
+        expected = f"the suffix {', '.join(FORMATS)}, each but {whole} also with .gz behind"
         raise LogError(f"{place.path}: expected {expected}, got {got}")
     return packed, suffix

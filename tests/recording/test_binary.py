@@ -133,4 +133,6 @@ def test_a_database_does_not_say_which_frames_are_of_can_fd(tmp_path: Path) -> N
 
 def test_what_is_no_database(tmp_path: Path) -> None:
     assert "file is not a database" in error_of(kept(tmp_path, "a.db", "x" * 1000))
-    assert "each also with .gz behind" in error_of(kept(tmp_path, "a.db.gz", ""))
+    assert "each but .db also with .gz behind, got '.db.gz'" in error_of(
+        kept(tmp_path, "a.db.gz", "")
+    )

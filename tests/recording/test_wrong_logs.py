@@ -93,9 +93,10 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         (
             "a.xyz",
             "",
-            f"expected the suffix {', '.join(FORMATS)}, each also with .gz behind, got '.xyz'",
+            f"expected the suffix {', '.join(FORMATS)}, each but .db also with .gz behind, got"
+            " '.xyz'",
         ),
-        ("drive", "", "each also with .gz behind, got none"),
+        ("drive", "", "each but .db also with .gz behind, got none"),
     ],
 )
 def test_what_is_no_log_is_reported_with_its_place(

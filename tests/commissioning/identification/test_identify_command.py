@@ -216,7 +216,7 @@ BAD = {
     "nothing": ("", "expected a log or a stopwatch, got neither"),
     "no such log": ("nowhere.log", "nowhere.log"),
     "no such table": ("nowhere.csv", "nowhere.csv"),
-    "no log": ("{logs}/empty", "each also with .gz behind, got none"),
+    "no log": ("{logs}/empty", "each but .db also with .gz behind, got none"),
     "no such file": (f"{LOG} --file nowhere.yaml", "nowhere.yaml"),
     "write to nothing": (f"{LOG} --write", "--write: expected --file too"),
     "no equals": (f"{LOG} --signal slew", "--signal: expected AXIS=NAME, got 'slew'"),
