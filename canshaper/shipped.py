@@ -1,6 +1,5 @@
 """Version of the program, and the deployments and DBC files that come with it."""
 
-from importlib.metadata import version as _version_of
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
@@ -9,7 +8,9 @@ PACKAGE = Path(__file__).resolve().parent
 
 def version() -> str:
     """Version by the tags of git, as it was installed."""
-    return _version_of("canshaper")
+    from importlib import metadata  # noqa: PLC0415  # slow, and --help needs none
+
+    return metadata.version("canshaper")
 
 
 def data_directory() -> Path:

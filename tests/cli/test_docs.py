@@ -1,6 +1,7 @@
 """``canshaper docs``: a built site is served on this machine only; else a line says where it is."""
 
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -72,7 +73,7 @@ def test_without_a_site_it_says_where_the_pages_are(monkeypatch: pytest.MonkeyPa
 
 def test_a_port_that_is_in_use_is_an_error(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verb, "site_directory", lambda: site)
-    with verb.ThreadingHTTPServer(("127.0.0.1", 0), verb._Pages) as other:
-        done = CliRunner().invoke(app, ["docs", "--port", str(other.server_port)])
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        done = CliRunner().invoke(app, ["docs", "--port", str(other.getsockname()[1])])
     assert done.exit_code == 1
     assert "Address already in use; try --port 0" in done.output

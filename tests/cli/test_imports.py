@@ -157,3 +157,15 @@ def test_a_module_that_is_no_tool_is_a_fault_of_ours(tmp_path: Path) -> None:
     done = without(("yaml",), tmp_path, "check", str(SHIPPED))
     assert done.returncode == 1
     assert "ModuleNotFoundError: import of yaml halted" in done.stderr
+
+
+def test_help_needs_no_library_of_the_network() -> None:
+    """It imports every verb for its line; these take longer than the rest of it."""
+    code = "import sys; sys.argv[1:] = ['--help']; from canshaper.cli.app import main\n"
+    code += (
+        "try: main()\nfinally: print({'ssl', 'email', 'http'} & {*sys.modules}, file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stderr == "set()\n"

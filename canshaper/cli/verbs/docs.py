@@ -1,7 +1,6 @@
 """``canshaper docs``: the pages that come with the program."""
 
 from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import typer
 
@@ -14,13 +13,6 @@ GROUP = "look"
 EXIT_NO_ADDRESS = 1
 # A browser shows what it would else save.
 TEXTS = dict.fromkeys((".md", ".py", ".toml", ".yaml", "", ".link", ".network"), "text/plain")
-
-
-class _Pages(SimpleHTTPRequestHandler):
-    extensions_map = {**SimpleHTTPRequestHandler.extensions_map, **TEXTS}  # noqa: RUF012
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Log nothing of a request."""
 
 
 def docs(
@@ -36,13 +28,21 @@ def docs(
 
       canshaper docs --port 0
     """
+    from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+    class Pages(SimpleHTTPRequestHandler):
+        extensions_map = {**SimpleHTTPRequestHandler.extensions_map, **TEXTS}  # noqa: RUF012
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Log nothing of a request."""
+
     site = site_directory()
     if site is None:
         pages = data_directory() / "docs"
         where = f"read {pages}, or run make docs" if pages.is_dir() else "install a release"
         raise UsageError(f"the site is not in this installation: {where}")
     try:
-        server = ThreadingHTTPServer(("127.0.0.1", port), partial(_Pages, directory=str(site)))
+        server = ThreadingHTTPServer(("127.0.0.1", port), partial(Pages, directory=str(site)))
     except OSError as error:
         text = f"cannot serve at port {port}: {error.strerror or error}; try --port 0"
         raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
