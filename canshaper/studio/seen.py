@@ -106,7 +106,7 @@ class Swing:
     """Largest sway in any direction over one full swing, and how long it lasts after a release.
 
     Args:
-        models: sway models of the deployment; their longest period (or ``LEAST_SWING_S``) is a full swing.
+        models: sway models; a full swing is the longest of their periods and ``LEAST_SWING_S``.
         still_deg: swing below which the grapple counts as still.
     """
 
