@@ -8,7 +8,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from canshaper.errors import CanshaperError, ControlError, PageMessageError, printable
+from canshaper.errors import CanshaperError, PageMessageError, printable
 from canshaper.studio.cab import Cab, is_number
 from canshaper.studio.numbers import LiveNumbers
 from canshaper.studio.preference import Preference
@@ -224,7 +224,7 @@ class Client:
                     continue
                 try:
                     await asyncio.to_thread(self._stage.slide, name, factor)
-                except (ValueError, ControlError) as error:
+                except (ValueError, CanshaperError) as error:
                     self._refusals.append(str(error))
 
     # -- to the page ---------------------------------------------------------------------------

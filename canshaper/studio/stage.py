@@ -177,6 +177,7 @@ class Stage:
         Raises:
             ValueError: there is no such slider, or the factor is not allowed.
             ControlError: the daemon refuses or does not run.
+            ConfigError: the file with other filters cannot be written.
         """
         if name == PREFERENCE and self.preference:
             self._prefer(self.preference, factor)
