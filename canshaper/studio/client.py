@@ -35,7 +35,7 @@ class NumbersChannel:
         self._difference: dict[str, str] | None = None
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Queue the request of a message whose key ``numbers`` is a change or a word.
+        """Queue a message's request: ``numbers`` is a change, undo, swap, difference or write.
 
         Raises:
             PageMessageError: the message is no request, or too many requests wait.

@@ -38,7 +38,7 @@ CANSHAPER = tuple(canshaper_command())
 
 
 def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
-    """Write a copy of a file whose numbers the sliders may change; return its path and content.
+    """Write a copy of a file whose numbers the sliders may change; return path and deployment.
 
     Args:
         path: the file.
@@ -118,7 +118,7 @@ class Crane:
         self._status.bind(str(self._status_path))
 
     def check(self, now_s: float) -> None:
-        """Report processes that have ended; start them, and ``RESTART_S`` after an end again."""
+        """Start processes that do not run; report an end, and start again ``RESTART_S`` later."""
         for verb, child in self._children.items():
             if child.process is None:
                 if now_s >= child.start_at_s and not self._stopping:

@@ -82,7 +82,7 @@ def play_log(
         deployments: at least one; all have the axes of the first one.
         own: the first deployment came with the log, in one bundle.
         channels: channel by bus from the command line.
-        window: begin and end of the pictures to keep.
+        window: begin and end of the pictures to keep, s.
         parameters: the simulated crane behind the valve frames of each replay.
         progress: see ``Progress``; it begins anew with each deployment.
 
@@ -178,7 +178,7 @@ def _frames(drive: Drive, start_ns: int) -> Iterator[tuple[float, Frame]]:
 def play_seed(
     deployments: Sequence[Named], seed: int, nominal: CraneParameters, progress: Progress
 ) -> Playback:
-    """Repeat a drive of a campaign with each deployment, and last raw: the first, bypassed.
+    """Repeat a drive of a campaign with each deployment; the last film is without anti-sway.
 
     Args:
         deployments: at least one; the drive is drawn from the ranges of the first.

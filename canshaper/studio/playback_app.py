@@ -24,12 +24,7 @@ COLORS = ("--shaped", "--other", "--raw")
 
 @dataclass
 class Choice:
-    """A drive that can be opened.
-
-    Attributes:
-        title: title in the list.
-        load: makes the drive; may take long.
-    """
+    """A drive that can be opened: its title in the list, and ``load``, which makes it (slow)."""
 
     title: str
     load: Callable[[], Playback]

@@ -101,7 +101,7 @@ def _responses(deployment: Deployment, axis: str) -> Iterator[tuple[Filter, floa
 
 
 def _fitting(deployment: Deployment, axis: str, chosen: Filter, tail_s: float) -> Setting | None:
-    """Return the setting if it is within the range of the slider, else None."""
+    """Return the setting; None if useless, under half a swing, or still later than unfiltered."""
     config = deployment.axes[axis].config
     assert config.sway is not None
     setting, run_on_s, raw_s = _measured(deployment, axis, chosen, tail_s)
@@ -194,7 +194,7 @@ class Preference:
 
         Raises:
             ValueError: the position is not on the slider.
-            ConfigError: the settings make no valid deployment; the copy is unchanged.
+            ConfigError: no valid deployment, or it cannot be written; the copy is unchanged.
         """
         if not (position == AS_IN_FILE or 0.0 <= position <= 1.0):
             raise ValueError(f"slider {PREFERENCE}: expected 0 to 1, got {str(position)[:20]}")

@@ -139,8 +139,7 @@ class Swing:
         """Return the time in s from release to the last sway of ``still_deg``, and if it goes on.
 
         The time is None before a release, while a joystick is deflected, and after a press that
-        opened no valve. The swing is over when no such sway has come for as long as one full
-        swing.
+        opened no valve. The swing is over when no such sway has come for one full swing.
         """
         if self._released_s is None:
             return None, False

@@ -156,7 +156,7 @@ class Guard:
         self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve or refuse a request or connection; the token of the first goes into a cookie."""
+        """Serve or refuse a request or connection; a token in its URL goes into a cookie."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return

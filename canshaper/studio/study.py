@@ -223,7 +223,7 @@ class Session:
     def see(
         self, level: str, place: tuple[float, float] | None, swing_deg: float | None, now_s: float
     ) -> None:
-        """Take level of all axes, place (m ahead, m left), swing each tick; change the phase."""
+        """Take level of all axes, place (m ahead, m left), swing each tick; abort after a stop."""
         held_up, self._seen_s = now_s - self._seen_s > HELD_UP_S, now_s
         self._place, self._swing_deg, lasts_s = place, swing_deg or 0.0, now_s - self._since_s
         if self.phase == "ready" and level == "move":

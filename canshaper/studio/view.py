@@ -144,7 +144,7 @@ class CraneView:
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:
-        """Report that the crane has fallen silent, or the daemon has or is back.
+        """Report that the crane falls silent, or that the daemon falls silent or is back.
 
         Forget what a silent crane, daemon or joystick has sent last: sway, axes, positions.
         """

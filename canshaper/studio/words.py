@@ -28,12 +28,7 @@ def _texts() -> dict[str, str]:
 
 
 def said(what: str, **values: object) -> str:
-    """Return a message of the studio in English; the page shows it in the reader's language.
-
-    Args:
-        what: key of the text in the tables of the page, without its prefix "said.".
-        values: values that the text shows, by name.
-    """
+    """Return the page's text "said.WHAT" in English, with values by name; pages translate it."""
     return _texts()[f"said.{what}"].format(**values)
 
 
