@@ -35,7 +35,7 @@ class Access:
         return f"canshaper-studio-{self.port}"
 
     def host_fault(self, host: str) -> str | None:
-        """Return why a request for this host is refused, or None."""
+        """Return why a request with this Host header is refused, or None."""
         name, colon, port = host.rpartition(":")
         if not colon or port.endswith("]"):
             name, port = host, "80"
@@ -45,14 +45,14 @@ class Access:
         return None
 
     def origin_fault(self, host: str, origin: str | None) -> str | None:
-        """Return why a connection from this origin is refused, or None."""
+        """Return why a connection is refused whose Origin is not this host, or None."""
         if origin != f"http://{host}":
             got = f"the origin {origin[:60]!r}" if origin else "no origin"
             return f"expected the page of this studio, got {got}"
         return None
 
     def token_fault(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> str | None:
-        """Return why a request without the right token is refused, or None."""
+        """Return why a request is refused that lacks the token in query and cookie, or None."""
         if self.token is None:
             return None
         for shown in (query.get("token"), cookies.get(self.cookie)):
@@ -76,10 +76,10 @@ ANY = {"0.0.0.0": "192.0.2.1", "::": "2001:db8::1"}
 
 
 def reachable(host: str) -> str:
-    """Return the host name with which another machine opens the page.
+    """Return the host name or address with which another machine opens the page.
 
-    If ``host`` means all addresses, it is that of the default route, or without a route the name of
-    this machine. The function sends nothing.
+    It is ``host``, unless that means all addresses: then our address on the default route, or
+    without a route the name of this machine. The function sends nothing.
     """
     if host not in ANY:
         return host

@@ -16,23 +16,23 @@ from canshaper.studio.words import said
 from canshaper_sim.hand import Held
 
 SILENT_S = 0.2
-"""A page that drives sends every 20 ms."""
+"""A driving page without positions for so long, s, is silent; it sends them every 20 ms."""
 RELEASE_S = 3.0
-"""From joysticks in neutral to enable released: the longest usual run-on after release."""
+"""From joysticks in neutral to enable released, s: meant to outlast the run-on of the axes."""
 RESET_S = 0.3
-"""How long the reset switch is held: some messages of a joystick."""
+"""How long the reset switch is held, s: some messages of a joystick."""
 PRESS_S, PAUSE_S = 0.1, 0.1
-"""Press of the button for the next profile, and the pause after it."""
+"""Press of the button for the next profile, and the pause after it, s."""
 MOST_PRESSES = 5
 """Presses of it that may wait for those before."""
 NEUTRAL = 0.02
-"""Below it a joystick of the page counts as neutral."""
+"""Up to this deflection (full: 1) a joystick of the page counts as neutral."""
 
 Report = Callable[[str], None]
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Return whether a value of a JSON message is a number."""
+    """Return whether a value of a JSON message is a number; true and false are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -41,7 +41,7 @@ class Cab:
 
     Args:
         axes: names of the axes with a joystick.
-        report: called with a text on each action of the driver.
+        report: called with a text on each event of the seat: driver, silence, enable, anti-sway.
     """
 
     def __init__(self, axes: Iterable[str], report: Report) -> None:
@@ -59,7 +59,7 @@ class Cab:
         self._presses_s = deque([-math.inf], maxlen=MOST_PRESSES)  # when each begins
 
     def take(self, page: int, now_s: float) -> None:
-        """Let a page drive; a present driver loses the joysticks, and enable is released later."""
+        """Let a page drive; another driver loses the joysticks, and enable ``RELEASE_S`` later."""
         if page == self.driver:
             return
         if self.driver is not None:
@@ -70,17 +70,19 @@ class Cab:
         self._centred = False
 
     def leave(self, page: int, now_s: float) -> None:
-        """Free the seat of a page that has gone or must let go."""
+        """Free the seat if this page drives: neutral now, enable released ``RELEASE_S`` later."""
         if page == self.driver:
             self._report(said("leaves", page=page))
             self._let_go(now_s)
             self.driver = None
 
     def joysticks(self, page: int, joysticks: Mapping[str, Any], now_s: float) -> None:
-        """Take the positions of all joysticks; ignore those of a page that does not drive.
+        """Take the position of each axis; it counts once the driver has had all in neutral.
+
+        Positions of a page that does not drive are checked and ignored. Missing axes are neutral.
 
         Raises:
-            PageMessageError: an axis is unknown or its value is no position.
+            PageMessageError: an axis is unknown, or its value is no number from -1 to 1.
         """
         for name, value in joysticks.items():
             if name not in self._axes:
@@ -100,12 +102,15 @@ class Cab:
         self._joysticks = {n: float(v) for n, v in joysticks.items()} if self._centred else {}
 
     def nonsense(self, page: int, now_s: float) -> None:
-        """Ignore the joysticks of a page that sent nonsense, until they are in neutral."""
+        """Set the joysticks to neutral if this page drives; enable ends ``RELEASE_S`` later."""
         if page == self.driver:
             self._let_go(now_s)
 
     def press_enable(self, page: int, on: bool, now_s: float) -> None:
-        """Press or release the enable switch; its release stops everything at once."""
+        """Press or release enable if this page drives.
+
+        A release stops everything at once. A press has no effect while a release is due.
+        """
         if page != self.driver:
             return
         if not on:
@@ -115,25 +120,25 @@ class Cab:
             self.enable, self._release_at_s = True, None
 
     def press_reset(self, page: int, now_s: float) -> None:
-        """Press the reset switch for a moment."""
+        """Press the reset switch for ``RESET_S`` if this page drives."""
         if page == self.driver:
             self._reset_until_s = now_s + RESET_S
 
     def press_next_profile(self, page: int, now_s: float) -> None:
-        """Press the button for the next profile for a moment."""
+        """Queue a press of next profile if this page drives; drop it if ``MOST_PRESSES`` wait."""
         if page == self.driver:
             begin_s = max(now_s, self._presses_s[-1] + PRESS_S + PAUSE_S)
             if begin_s < now_s + MOST_PRESSES * (PRESS_S + PAUSE_S):
                 self._presses_s.append(begin_s)
 
     def switch_anti_sway(self, page: int, on: bool) -> None:
-        """Switch anti-sway on or off."""
+        """Switch anti-sway on or off if this page drives."""
         if page == self.driver and on is not self.anti_sway:
             self.anti_sway = on
             self._report(said("on" if on else "off"))
 
     def held(self, now_s: float) -> Held:
-        """Return the present state of the hand."""
+        """Let go if the driver is silent, release enable when due; return what the hand holds."""
         self._watch(now_s)
         reset = now_s < self._reset_until_s
         pressed = any(0.0 <= now_s - begin_s < PRESS_S for begin_s in self._presses_s)

@@ -8,7 +8,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from canshaper.errors import CanshaperError, ControlError, PageMessageError, printable
+from canshaper.errors import CanshaperError, PageMessageError, printable
 from canshaper.studio.cab import Cab, is_number
 from canshaper.studio.numbers import LiveNumbers
 from canshaper.studio.preference import Preference
@@ -20,10 +20,10 @@ MOST_NAME = 40
 
 
 class NumbersChannel:
-    """Queue of one page's requests for numbers; while the daemon answers slowly, pictures go on.
+    """Queue of one page's requests to change numbers; a slow daemon does not hold pictures up.
 
     Args:
-        numbers: numbers of the machine.
+        numbers: the adjustable numbers of the machine's daemon.
         page: number of the page, its name in changes if the person gives none.
     """
 
@@ -35,7 +35,7 @@ class NumbersChannel:
         self._difference: dict[str, str] | None = None
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Take a message of the page.
+        """Queue a message's request: ``numbers`` is a change, undo, swap, difference or write.
 
         Raises:
             PageMessageError: the message is no request, or too many requests wait.
@@ -68,11 +68,7 @@ class NumbersChannel:
         self._difference = self._numbers.difference()
 
     async def run(self, refuse: Callable[[str], None]) -> None:
-        """Do the requests, one after the other.
-
-        Args:
-            refuse: called with the reason if a request fails.
-        """
+        """Do requests one after the other, until cancelled; call ``refuse`` with why one failed."""
         while True:
             action = await self._waiting.get()
             try:
@@ -81,7 +77,7 @@ class NumbersChannel:
                 refuse(str(error))
 
     def news(self) -> dict[str, Any]:
-        """Return, and forget, the entries that the page has not been sent yet."""
+        """Return what is new for the page since the last call: ``numbers``, ``difference``."""
         news: dict[str, Any] = {}
         if self._version != self._numbers.version:
             self._version = self._numbers.version
@@ -99,9 +95,9 @@ def _numbers(values: object) -> dict[str, float]:
 
 SHOW_S = 1.0 / 30.0
 MOST_PER_S = 120
-"""Messages a second that a page may send for long; its joysticks are 50."""
+"""Mean messages a second that a page may send; the positions of its joysticks are 50."""
 BURST = 240
-"""Messages at once: what a page sends after a stall."""
+"""Messages that a page may send at once, as after a stall."""
 MOST_NONSENSE = 20
 """Refused messages after which a page is closed."""
 MOST_BYTES = 2048
@@ -141,7 +137,7 @@ class Client:
         self._numbers = NumbersChannel(stage.numbers, number) if stage.numbers else None
 
     async def serve(self) -> None:
-        """Serve the page until it is gone."""
+        """Serve the page until it is gone or closed; then free the driver's seat."""
         work = [self._receive(), self._show(), self._slide()]
         if self._numbers:
             work.append(self._numbers.run(self._refusals.append))
@@ -180,7 +176,7 @@ class Client:
                     return
 
     def _too_fast(self) -> str | None:
-        """Return why a page that has just sent a message is closed, or None."""
+        """Count a message; return why the page is closed for too many, or None."""
         now_s = time.monotonic()
         self._allowance = min(BURST, self._allowance + MOST_PER_S * (now_s - self._filled_s))
         self._filled_s = now_s
@@ -188,10 +184,10 @@ class Client:
         return f"expected {MOST_PER_S} messages a second at most" if self._allowance < 0 else None
 
     def _take(self, text: str | None) -> None:
-        """Execute a message.
+        """Execute a message; numbers, settings and sliders go on in other tasks.
 
         Raises:
-            PageMessageError: the message is not a known one.
+            PageMessageError: the message is not a known one, or has a wrong value.
         """
         message = parsed(text)
         number = self._number
@@ -216,7 +212,7 @@ class Client:
             self._slid.set()
 
     async def _slide(self) -> None:
-        """Pass on the last position of each slider; a daemon answers slowly."""
+        """Pass the last position of each slider on; refuse it if the page does not drive."""
         while True:
             await self._slid.wait()
             self._slid.clear()
@@ -228,7 +224,7 @@ class Client:
                     continue
                 try:
                     await asyncio.to_thread(self._stage.slide, name, factor)
-                except (ValueError, ControlError) as error:
+                except (ValueError, CanshaperError) as error:
                     self._refusals.append(str(error))
 
     # -- to the page ---------------------------------------------------------------------------
@@ -265,7 +261,7 @@ class Client:
 
 
 def parsed(text: str | None) -> dict[str, Any]:
-    """Return a message of a page as an object.
+    """Return a JSON message of a page as a dict.
 
     Raises:
         PageMessageError: the text is no JSON object.

@@ -37,7 +37,7 @@ class Commission:
         self._process: subprocess.Popen[str] | None = None
 
     def routes(self) -> list[BaseRoute]:
-        """Return the routes of these pages for the server."""
+        """Return the routes for page, state, files and requests of the commissioning."""
         return [
             Route("/commission", self._page),
             Route("/commission/state", self._state),
@@ -46,7 +46,7 @@ class Commission:
         ]
 
     def close(self) -> None:
-        """End the process, whatever it does."""
+        """End the process, even while it runs a step; the next request starts another."""
         if self._process:
             with self._process as process:  # the context closes its pipes
                 process.terminate()
@@ -61,7 +61,7 @@ class Commission:
         return await self._answer("show", "", "")
 
     async def _do(self, request: Request) -> Response:
-        """Answer a request to run a step, to accept its proposal, or to skip it."""
+        """Run, accept or skip a step; refuse on a machine and while another request is done."""
         what, step = request.path_params["what"], request.path_params["step"]
         if what not in ("run", "accept", "skip"):
             return PlainTextResponse("no such page\n", NOT_FOUND)
@@ -73,7 +73,7 @@ class Commission:
         return await self._answer(what, step, request.query_params.get("answer", ""))
 
     async def _file(self, request: Request) -> Response:
-        """Answer with a picture of a step, or with the report."""
+        """Answer with a picture of a step or the report, if the last state named it."""
         name = request.path_params["name"]
         known = [p for step in self._shown["steps"] for p in step["pictures"]]
         if name not in known and name != (self._shown.get("report") or None):
@@ -81,7 +81,7 @@ class Commission:
         return FileResponse(Path(self._shown["folder"]) / name)
 
     async def _answer(self, what: str, step: str, answer: str) -> Response:
-        """Do the request and answer with the state of the page; while busy, with the last state."""
+        """Do the request and answer with the state; while busy or without a file, only answer."""
         if self._path and not self._busy:
             self._busy = step or "reading"
             try:

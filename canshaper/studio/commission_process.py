@@ -28,11 +28,7 @@ _CHOICE = ("offered", "recommended", "chosen")  # numbers of a step that asks fo
 
 
 class Reader:
-    """The person in front of the page, who sees no progress bar.
-
-    Args:
-        word: the person's answer to the question that allows it.
-    """
+    """The person in front of the page, who answers ``word`` and sees no progress bar."""
 
     def __init__(self, word: str = "") -> None:
         self._word = word
@@ -57,18 +53,18 @@ class Reader:
 def work(
     what: str, path: Path, changes: list[str], step: str, *, machine: bool, answer: str = ""
 ) -> dict[str, Any]:
-    """Do a request of the page.
+    """Do a request of the page; return the state, also after an error.
 
     Args:
         what: ``show``, ``run``, ``accept`` or ``skip``.
-        path: the deployment file.
-        changes: parameters of the simulated crane, NAME=VALUE.
+        path: the deployment file; a rehearsal works on a copy beside it.
+        changes: parameters of the simulated crane, NAME=VALUE; none: those of the last rehearsal.
         step: name of the step; empty to show.
         machine: show the commissioning of the machine; else its rehearsal.
         answer: answer to a question of the step.
 
     Returns:
-        The state for the page; ``error`` says why a request was not done.
+        The state for the page; ``error`` says why the request was not done, "" if it was.
     """
     error, news = "", ""
     try:
@@ -87,7 +83,7 @@ def work(
 
 @contextmanager
 def _procedure(path: Path, changes: list[str], answer: str) -> Iterator[Procedure]:
-    """Open the rehearsal of a file, locked against other processes."""
+    """Open the rehearsal of a file, on a copy made if missing; lock it for other processes."""
     check_rehearsal(load_deployment(path))  # messages name this file, not the copy
     files = Files(copy_for_rehearsal(path))
     with files.locked():
@@ -110,7 +106,7 @@ def _do(procedure: Procedure, path: Path, what: str, name: str) -> None:
 
 
 def _shown(path: Path, changes: list[str], *, machine: bool) -> dict[str, Any]:
-    """Return the progress of the commissioning, and the proposal of the last run."""
+    """Return progress of the steps that apply, and the proposal of the last run if still open."""
     files = Files(path if machine else rehearsal_of(path))
     state = read_state(files.state) or State(changes=changes)
     deployment = load_deployment(path)

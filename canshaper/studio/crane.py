@@ -38,7 +38,7 @@ CANSHAPER = tuple(canshaper_command())
 
 
 def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
-    """Return path and deployment of a copy of a file whose numbers the sliders may change.
+    """Write a copy of a file whose numbers the sliders may change; return path and deployment.
 
     Args:
         path: the file.
@@ -63,7 +63,7 @@ def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
 
 @dataclass
 class Child:
-    """A process, or the time of its next start."""
+    """A process and its log; without ``process`` it starts at ``start_at_s`` (monotonic, s)."""
 
     command: list[str]
     log: Path
@@ -72,7 +72,7 @@ class Child:
 
 
 class Crane:
-    """``canshaper sim`` and ``canshaper run`` on a bus of their own, restarted when they end.
+    """``canshaper sim`` and ``canshaper run`` on a bus of their own; ``check`` (re)starts them.
 
     Args:
         name: name of the crane, for logs and sockets.
@@ -85,7 +85,7 @@ class Crane:
 
     Attributes:
         control: control socket of the daemon.
-        starts: number of starts of the daemon.
+        starts: number of starts of the daemon so far.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Crane:
         self._status.bind(str(self._status_path))
 
     def check(self, now_s: float) -> None:
-        """Report processes that have ended; start those that are due."""
+        """Start processes that do not run; report an end, and start again ``RESTART_S`` later."""
         for verb, child in self._children.items():
             if child.process is None:
                 if now_s >= child.start_at_s and not self._stopping:
@@ -151,12 +151,12 @@ class Crane:
             os.sched_setscheduler(child.process.pid, os.SCHED_FIFO, os.sched_param(priority))
 
     def reload(self) -> None:
-        """Make the daemon read its file again, as its service manager does."""
+        """Make the daemon read its file again, by SIGHUP; do nothing if it does not run."""
         if (process := self._children["run"].process) is not None:
             process.send_signal(signal.SIGHUP)
 
     def late_us(self) -> int | None:
-        """Return the largest lateness of a tick in the last second, us; None without a report."""
+        """Return the daemon's last report of its largest lateness, us; None if none is new."""
         late = None
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -166,7 +166,7 @@ class Crane:
         return late
 
     def stop(self) -> None:
-        """End both processes, the daemon first: it leaves the valves neutral."""
+        """End both processes for good, the daemon first: it leaves the valves neutral."""
         self._stopping = True
         for verb in ("run", "sim"):
             if (process := self._children[verb].process) is not None:
@@ -180,7 +180,7 @@ def _last_line(log: Path) -> str:
 
 
 def groups(count: int) -> list[Transport]:
-    """Return multicast groups of this process alone: two studios on a machine do not meet."""
+    """Return ``count`` multicast groups, chosen by process id: two studios do not meet."""
     pid = os.getpid()  # at most 2 ** 22
     first = 100 + count * (pid // 65536) % 128
     names = [f"239.{first + i}.{pid // 256 % 256}.{pid % 256}" for i in range(count)]
@@ -208,14 +208,14 @@ class SimulatedPose:
 
     @staticmethod
     def fits(deployment: Deployment) -> bool:
-        """Return whether the simulated crane has a deployment's axes and its view can show it."""
+        """Return whether a crane without a rope has all axes of a deployment but the rotator."""
         moves = deployment.coordinates
         axes = {moves.get(name, name) for name in deployment.axes.keys() - {ROTATOR}}
         kind = machine_for(moves.values())
         return kind not in ON_ROPE and axes <= {*AXES_OF[kind]}
 
     def advance(self, dt_s: float, now_s: float) -> None:
-        """Hold the last valve commands for dt_s seconds."""
+        """Move the crane by the view's valve commands for dt_s seconds; give the view its pose."""
         view, crane = self._view, self._machine.crane
         self._machine.step(
             dt_s, {moved: view.axes[name].opening for moved, name in self._axes.items()}
@@ -232,7 +232,10 @@ class SimulatedPose:
 
 @dataclass
 class CraneSession:
-    """A crane that the page shows; ``hand`` moves its joysticks, ``here`` runs it locally."""
+    """A crane on the page, with its ports by bus and, if simulated, its processes or ``here``.
+
+    ``hand`` sends joystick frames on the ports. Unless ``shaped``, anti-sway stays off.
+    """
 
     view: CraneView
     ports: Mapping[str, Port]
@@ -242,7 +245,10 @@ class CraneSession:
     here: "InProcessCrane | None" = None
 
     def exchange(self, time_ms: int, held: Held, now_s: float, passed_ms: int) -> None:
-        """Take the waiting frames; move the joysticks if the page drives the crane."""
+        """Give the view all waiting frames, or those of ``here`` in passed_ms; call its ``check``.
+
+        With a hand, also send the joystick frames that are due at time_ms.
+        """
         frames: list[Frame] = []
         for port in self.ports.values():
             frames += port.frames()
@@ -254,7 +260,7 @@ class CraneSession:
         self.view.check(now_s)
 
     def move_joysticks(self, time_ms: int, held: Held) -> list[Frame]:
-        """Send the due joystick frames if the page drives the crane; return these frames."""
+        """Send the joystick frames that are due at time_ms; return them (none without a hand)."""
         frames = list(self.hand.frames(time_ms, held)) if self.hand else []
         for frame in frames:
             self.ports[frame.bus].send(frame)

@@ -22,7 +22,7 @@ from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 
 MOST_MS = 500
-"""Longest time that is caught up with; a computer that was asleep goes on where it was."""
+"""Longest time that is caught up with, ms; after sleep a computer goes on where it was."""
 
 
 class InProcessCrane:
@@ -31,15 +31,15 @@ class InProcessCrane:
     Args:
         deployment: the machine; its buses are not opened.
         changes: parameters of the crane, NAME=VALUE.
-        crane: name of the crane, if the deployment has several; the others' joysticks stand still.
+        crane: name of the crane to drive, other cranes' joysticks stand still; None for all.
         report: called with the text of a filter error; a status frame carries only its reason.
         joysticks: source of joystick frames; by default a hand that ``frames`` moves.
 
     Attributes:
-        cycle_ms: cycle of the joysticks.
+        cycle_ms: cycle of the joysticks, ms.
 
     Raises:
-        DriveError: no simulated crane fits the deployment.
+        DriveError: no simulated crane fits the deployment, or a change or the name is wrong.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class InProcessCrane:
         self._due_ms = 0
 
     def frames(self, held: Held, passed_ms: int) -> list[Frame]:
-        """Let time pass with these joysticks; return every frame that was on a bus meanwhile."""
+        """Let passed_ms (``MOST_MS`` at most) pass with these joysticks; return its frames."""
         self._hand.held = held
         self._due_ms += min(passed_ms, MOST_MS)
         while self._lock_step.time_ms < self._due_ms:
@@ -90,7 +90,7 @@ class InProcessCrane:
         return frames
 
     def change(self, values: Mapping[str, float]) -> None:
-        """Change numbers of the controller.
+        """Change numbers of the controller, by key as in the file, all or none.
 
         Raises:
             ValueError: the controller does not allow the change.
@@ -98,7 +98,7 @@ class InProcessCrane:
         self._adjuster.change(values)
 
     def reload(self, deployment: Deployment) -> None:
-        """Use other filters, as after a reload, once every axis is neutral."""
+        """Go on with this deployment, as after a reload, once every axis is neutral."""
         self._next = deployment
 
     def _use(self, deployment: Deployment) -> None:
@@ -112,22 +112,22 @@ class InProcessCrane:
 
 
 class HeldHand:
-    """A source of joystick frames, from the state of the page's hand."""
+    """A source of joystick frames; whoever owns it puts the hand's state into ``held``."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.hand, self.held = Hand(deployment), Held()
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
-        """Return the frames since the last tick."""
+        """Return the frames with ``held`` that are due in the last tick_ms up to time_ms."""
         due = self.hand.due(time_ms, tick_ms)
         return [frame for ms in due for frame in self.hand.frames(ms, self.held)]
 
 
 PICTURE_S = 0.04
 MOST_PICTURES = 15_000
-"""Ten minutes: as much as the charts of the page keep."""
+"""Pictures of a film: ten minutes, as much as the charts of the page keep."""
 LIVE_ONLY = frozenset(("sources", "late_us"))
-"""Values of a crane that are known only while it is listened to."""
+"""Values of ``CraneView.values`` that a film leaves out: known only on a live bus."""
 
 
 class CraneFilm:
@@ -142,9 +142,9 @@ class CraneFilm:
     Attributes:
         view: present state of the crane.
         numbers: number of each picture; its time is ``number * PICTURE_S``.
-        pictures: the values that a live page would have shown.
-        events: (time in s, name, text, level) of each event.
-        full: the drive had more than ``MOST_PICTURES``; the rest was dropped.
+        pictures: values that a live page would have shown, but for ``LIVE_ONLY``.
+        events: (time in s, name, text, level) of each event from begin to end.
+        full: the drive had more than ``MOST_PICTURES``; later pictures and events were dropped.
     """
 
     def __init__(
@@ -161,12 +161,12 @@ class CraneFilm:
         self._next = 0
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame from the buses of the crane."""
+        """Give a frame from the buses of the crane to the view, at now_s of the drive."""
         self._now_s = now_s
         self.view.receive(frame, now_s)
 
     def advance(self, now_s: float) -> None:
-        """Take the pictures that are due up to now_s."""
+        """Keep the pictures from begin to end that are due up to now_s; report silent nodes."""
         last = int(now_s / PICTURE_S + 1e-6)
         while self._next <= last:
             self._now_s = self._next * PICTURE_S
@@ -176,7 +176,7 @@ class CraneFilm:
             self._next += 1
 
     def leap(self, now_s: float) -> None:
-        """Skip the pictures up to now_s: nothing happened until then."""
+        """Skip the pictures before now_s: nothing happened until then."""
         self._next = max(self._next, int(now_s / PICTURE_S))
 
     def _within(self) -> bool:

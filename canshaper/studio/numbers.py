@@ -35,7 +35,7 @@ class Change(NamedTuple):
     Attributes:
         time_s: time of day, seconds of the epoch.
         who: name of the person or program that changed them.
-        numbers: key -> (value before, value after).
+        numbers: (value before, value after) by key in the file.
     """
 
     time_s: float
@@ -44,15 +44,15 @@ class Change(NamedTuple):
 
 
 class LiveNumbers:
-    """The adjustable numbers of one daemon. Any thread may call.
+    """The adjustable numbers of one daemon, read every ``POLL_S``. Any thread may call.
 
     Args:
         file: the deployment file.
         control: control socket of the daemon.
-        report: called with a text on each change.
+        report: called with a text on each change, also by others, and when the file is written.
 
     Attributes:
-        version: grows whenever there is something new to show.
+        version: grows whenever ``shown`` may be new.
     """
 
     def __init__(self, file: Path, control: Path, report: Callable[[str], None]) -> None:
@@ -68,7 +68,7 @@ class LiveNumbers:
         self._thread = threading.Thread(target=self._watch, name="numbers")
 
     def start(self) -> None:
-        """Begin to watch for changes by others."""
+        """Begin to read the daemon's numbers, in a thread."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -78,7 +78,7 @@ class LiveNumbers:
             self._thread.join()
 
     def shown(self) -> dict[str, Any]:
-        """Return everything that the page shows."""
+        """Return the table, fault, changes, numbers before the last, and how many can be undone."""
         with self._lock:
             return {
                 "table": self._table,
@@ -89,7 +89,7 @@ class LiveNumbers:
             }
 
     def in_force(self) -> dict[str, float]:
-        """Return the present value of every number, by key."""
+        """Return every number by key, as last read from the daemon; none before the first time."""
         with self._lock:
             return self._now()
 
@@ -98,7 +98,7 @@ class LiveNumbers:
 
         Args:
             values: new values by key.
-            seen: values that the page showed, by key; a value changed since refuses all.
+            seen: values that the page showed, by key; one that is not the present one refuses all.
             who: name for the list of changes.
 
         Raises:
@@ -116,10 +116,10 @@ class LiveNumbers:
             self._before.append({key: before[key] for key in values})
 
     def undo(self, who: str) -> None:
-        """Undo the last change that was made here.
+        """Undo the last change that was made here, unless others have changed numbers since.
 
         Raises:
-            ControlError: there is no such change, or the daemon refuses.
+            ControlError: there is none, or the daemon refuses or does not answer.
         """
         with self._lock:
             self._look()
@@ -129,10 +129,10 @@ class LiveNumbers:
             self._before.pop()
 
     def swap(self, who: str) -> None:
-        """Swap the present numbers with those before the last change (A/B).
+        """Swap the present numbers with those before the last change by anyone (A/B).
 
         Raises:
-            ControlError: there are no earlier numbers, or the daemon refuses.
+            ControlError: there are no earlier numbers, or the daemon refuses or does not answer.
         """
         with self._lock:
             self._look()
@@ -144,7 +144,7 @@ class LiveNumbers:
             self._before.append({key: now[key] for key in values})
 
     def difference(self) -> dict[str, str]:
-        """Return the difference that ``write`` would make in the file, and the file's hash."""
+        """Return what ``write`` would change, as ``text`` of a diff, and the file's ``hash``."""
         with self._lock:
             self._look()
             before = self._file.read_text(encoding="utf-8")
@@ -158,14 +158,14 @@ class LiveNumbers:
             return {"text": "\n".join(lines), "hash": _hash(before)}
 
     def write(self, file_hash: str, who: str) -> None:
-        """Write the present numbers into the file.
+        """Write the daemon's numbers that differ from the file into the file.
 
         Args:
-            file_hash: hash of the file that the person saw in ``difference``.
+            file_hash: hash from ``difference``, whose text the person saw.
             who: name for the list of events.
 
         Raises:
-            CanshaperError: the file has changed since, or cannot be changed.
+            CanshaperError: no daemon answers; the file has changed since, or cannot be changed.
         """
         with self._lock:
             self._look()
@@ -196,7 +196,7 @@ class LiveNumbers:
         self._look(who)
 
     def _look(self, who: str = OTHERS) -> None:
-        """Read the table of the daemon; note every changed number as a change by ``who``."""
+        """Read the daemon's table; keep and report changed numbers as a change by ``who``."""
         before = self._now()
         self._table = client.table(self._control)
         now = self._now()
@@ -231,12 +231,12 @@ def _hash(text: str) -> str:
 
 LENGTH = "length"
 RANGES = {LENGTH: (0.5, 2.0)}
-"""Allowed factors."""
+"""Least and largest factor of each slider; 1 is the file."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the file, and the power of the slider's factor that scales it.
+    """A number of the file that a slider scales.
 
     Attributes:
         key: dotted path in the deployment file.
@@ -254,10 +254,10 @@ class Number:
 
 
 def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
-    """Return the numbers of each slider; empty if no filter of the deployment has such a number.
+    """Return by slider the numbers that it scales: the pendulum's length or period of each axis.
 
-    The function leaves out an axis with a gain schedule, profiles or a measured rope, whose numbers
-    the machine changes, and one whose filter covers a second mode, which the slider cannot scale.
+    It leaves out axes with gain schedule, profiles or measured rope, whose numbers the machine
+    changes, and with a second mode, which it cannot scale. Without any axis there is no slider.
     """
     numbers: list[Number] = []
     for name, axis in config.axes.items():
@@ -272,7 +272,7 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
 
 
 def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:
-    """Return ``adjustable`` of the section control: the range of every number of a slider."""
+    """Return the section control's ``adjustable``: [least, most] by key of all sliders' numbers."""
     ranges = {}
     for name, numbers in by_slider.items():
         for number in numbers:
@@ -283,7 +283,7 @@ def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:
 
 
 def values(numbers: dict[str, list[Number]], name: str, factor: float) -> dict[str, float]:
-    """Return the numbers of a slider at this factor, by key.
+    """Return the scaled numbers of a slider at this factor, by key.
 
     Raises:
         ValueError: there is no such slider, or the factor is not allowed.

@@ -18,9 +18,9 @@ from canshaper.studio.stage import RAW
 from canshaper_sim.crane import CraneParameters
 
 RECORDED = "recorded"
-"""The crane that a log is of, as its frames say."""
+"""Name of the film from a log's own frames, beside those that are replayed."""
 QUIET_S = 1.0
-"""Part of a pause of a log of which pictures are kept, s."""
+"""A gap between ticks or frames of a log that is longer, s, is left out of the pictures."""
 
 Window = tuple[float, float | None]
 """Begin and end of the pictures that are kept, s; None for the end of the drive."""
@@ -42,7 +42,7 @@ class Playback:
 
     Attributes:
         title: title of the drive.
-        axes: names of the axes of its cranes.
+        axes: names of the axes, equal for all its cranes.
         parameters: the crane to draw.
         films: one film for each of its cranes.
         notes: notes to read before relying on the drive.
@@ -55,7 +55,7 @@ class Playback:
     notes: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the pictures and events of all cranes for JSON."""
+        """Return title, notes, pictures by crane, and all events by time, for JSON."""
         events = sorted(event for film in self.films for event in film.events)
         return {
             "title": self.title,
@@ -75,19 +75,20 @@ def play_log(
     parameters: CraneParameters,
     progress: Progress,
 ) -> Playback:
-    """Replay a log with some deployments.
+    """Replay a log with each deployment; a log that is no black box is also shown as recorded.
 
     Args:
         path: the log, or a black box.
         deployments: at least one; all have the axes of the first one.
-        own: the first deployment came with the log.
+        own: the first deployment came with the log, in one bundle.
         channels: channel by bus from the command line.
-        window: begin and end of the pictures to keep.
+        window: begin and end of the pictures to keep, s.
         parameters: the simulated crane behind the valve frames of each replay.
-        progress: see ``Progress``.
+        progress: see ``Progress``; it begins anew with each deployment.
 
     Raises:
-        LogError: the log does not fit one of the deployments.
+        LogError: the log cannot be used, or does not fit one of the deployments.
+        OSError: a black box cannot be read.
     """
     first = deployments[0].deployment
     playback = Playback(path.name, list(first.axes), parameters)
@@ -117,7 +118,7 @@ def _replayed(
     *,
     progress: Progress,
 ) -> int | None:
-    """Replay a log into a film; return the time of its first tick, or ``start_ns`` if given."""
+    """Replay a log into a film, and add notes; return ``start_ns``, or the first tick if None."""
     replay = Replay(deployment, drive)
     pose = None
     if SimulatedPose.fits(deployment):
@@ -151,7 +152,7 @@ def _replayed(
 
 
 def _recorded(film: CraneFilm, drive: Drive, deployment: Deployment, start_ns: int) -> None:
-    """Fill a film from the frames of a log alone."""
+    """Fill a film from the frames of a log alone, up to its end or the film's."""
     before_s = 0.0
     for now_s, frame in _frames(drive, start_ns):
         if now_s >= 0.0:
@@ -165,7 +166,7 @@ def _recorded(film: CraneFilm, drive: Drive, deployment: Deployment, start_ns: i
 
 
 def _frames(drive: Drive, start_ns: int) -> Iterator[tuple[float, Frame]]:
-    """Yield (time in s, frame) for the buses of a log that is no black box."""
+    """Yield (s since start_ns, frame) of a log that is no black box, until it is cut off."""
     try:
         for time_ns, channel, can_id, extended, data in LogFile(drive.path):
             if bus := drive.channels.get(channel):
@@ -177,7 +178,7 @@ def _frames(drive: Drive, start_ns: int) -> Iterator[tuple[float, Frame]]:
 def play_seed(
     deployments: Sequence[Named], seed: int, nominal: CraneParameters, progress: Progress
 ) -> Playback:
-    """Repeat a drive of a campaign, raw and with each deployment.
+    """Repeat a drive of a campaign with each deployment; the last film is without anti-sway.
 
     Args:
         deployments: at least one; the drive is drawn from the ranges of the first.

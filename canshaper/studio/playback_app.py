@@ -19,17 +19,12 @@ from canshaper.studio.server import drawn_of, page_app
 from canshaper.studio.stage import RAW
 
 COLORS = ("--shaped", "--other", "--raw")
-"""Colours of the cranes but the raw one, by the names in the style."""
+"""Colours of the cranes but the raw one, in their order, as names of variables in the style."""
 
 
 @dataclass
 class Choice:
-    """A drive that can be opened.
-
-    Attributes:
-        title: title in the list.
-        load: returns the drive.
-    """
+    """A drive that can be opened: its title in the list, and ``load``, which makes it (slow)."""
 
     title: str
     load: Callable[[], Playback]
@@ -71,7 +66,7 @@ class _Kept:
         self._content = b""
 
     def drive(self, number: int) -> bytes:
-        """Return a drive as JSON."""
+        """Return a drive as JSON; make it unless it is the kept one."""
         with self._lock:
             if number != self._number:
                 playback = self._choices[number].load()

@@ -37,12 +37,12 @@ _SHORTEST, _LONGEST = 0.5, 1.3
 _LENGTHS_PCT = (-10, 0, 10)
 
 Setting = dict[str, Any]
-"""Filter section and tail of an axis, what they leave (part of the swing, at worst within 10 % of
-the length), run-on in m and s until the grapple hangs still after full speed; None for never."""
+"""Filter section and ``tail_s`` of an axis; ``left``, a part of the swing, at worst within 10 % of
+the length; ``run_on_m`` and ``still_s``, from full speed until it hangs still (None: never)."""
 
 
 def offered(config: DeploymentConfig) -> list[str]:
-    """Return the axes whose filter has such settings."""
+    """Return the axes with lightly damped sway and a single G_FF or robust filter of one mode."""
     return [name for name, axis in config.axes.items() if _has_settings(axis)]
 
 
@@ -54,9 +54,9 @@ def _has_settings(axis: AxisSection) -> bool:
 
 
 def settings(deployment: Deployment, axis: str) -> dict[str, Any]:
-    """Return the setting of the ``file``, and those to ``choose`` from, quickest first.
+    """Return the setting of the ``file``, and those to ``choose`` from, quickest first; maybe none.
 
-    A longer response is left out if it leaves more, since ``stop_distance_m`` cuts it off.
+    A longer robust response that leaves more is left out: ``stop_distance_m`` cuts it off.
     """
     config = deployment.axes[axis].config
     made = _front if config.filter.kind == "gff" else _responses
@@ -101,7 +101,7 @@ def _responses(deployment: Deployment, axis: str) -> Iterator[tuple[Filter, floa
 
 
 def _fitting(deployment: Deployment, axis: str, chosen: Filter, tail_s: float) -> Setting | None:
-    """Return the setting if it is within the range of the slider, else None."""
+    """Return the setting; None if useless, under half a swing, or still later than unfiltered."""
     config = deployment.axes[axis].config
     assert config.sway is not None
     setting, run_on_s, raw_s = _measured(deployment, axis, chosen, tail_s)
@@ -115,7 +115,7 @@ def _fitting(deployment: Deployment, axis: str, chosen: Filter, tail_s: float) -
 def _measured(
     deployment: Deployment, axis: str, chosen: Filter, tail_s: float
 ) -> tuple[Setting, float, float]:
-    """Return the setting, its run-on to 5 % in s, and the still time in s without the filter."""
+    """Return the setting, its run-on to 5 % in s, and ``still_s`` without the filter."""
     sway = deployment.axes[axis].config.sway
     assert sway is not None
     setup = on_axis(deployment, axis, chosen, tail_s=tail_s)
@@ -149,7 +149,7 @@ class Preference:
     """The slider of a page from quicker to calmer.
 
     Args:
-        path: the copy of the deployment file that the page drives, in JSON.
+        path: the copy, in JSON, of the deployment file; the daemon of the page runs it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -161,7 +161,7 @@ class Preference:
         self._found: dict[str, Any] | None = None
 
     def found(self) -> dict[str, Any]:
-        """Return the ``settings`` of each axis; the first call waits for their computation."""
+        """Return ``settings`` by axis; the first call takes seconds. Empty if it failed."""
         with self._lock:
             if self._found is None:
                 command = [sys.executable, "-m", "canshaper.studio.preference", str(self._path)]
@@ -174,25 +174,27 @@ class Preference:
             return self._found
 
     def ready(self) -> dict[str, Any] | None:
-        """Return the settings of each axis; None while they are computed, without waiting."""
+        """Return ``settings`` by axis; None while a thread of the first call computes them."""
         if not self._started:
             self._started = True
             threading.Thread(target=self.found, daemon=True).start()
         return self._found
 
     def stop(self) -> None:
-        """End the process if it still runs."""
+        """End the process that computes the settings, also one that is about to start."""
         self._stopped = True
         if self._process:
             self._process.kill()
             self._process.wait()
 
     def write(self, position: float) -> Deployment:
-        """Write the settings at a position of the slider into the copy, and load it.
+        """Write the settings at a position of the slider into the copy, and return it loaded.
+
+        It waits for ``found``; ``AS_IN_FILE`` restores the filters of the file.
 
         Raises:
             ValueError: the position is not on the slider.
-            ConfigError: the settings make no valid deployment; the copy is unchanged.
+            ConfigError: no valid deployment, or it cannot be written; the copy is unchanged.
         """
         if not (position == AS_IN_FILE or 0.0 <= position <= 1.0):
             raise ValueError(f"slider {PREFERENCE}: expected 0 to 1, got {str(position)[:20]}")
@@ -208,7 +210,7 @@ class Preference:
 
 
 def main() -> None:
-    """Print the settings of each axis of a file."""
+    """Print ``settings`` by axis, as JSON, of the file that is the first argument."""
     os.nice(NICE)
     deployment = load_deployment(Path(sys.argv[1]))
     print(json.dumps({axis: settings(deployment, axis) for axis in offered(deployment.config)}))

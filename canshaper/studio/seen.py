@@ -22,7 +22,7 @@ MOST_FRAMES = 2000
 
 @dataclass
 class AxisView:
-    """State of an axis on the page: fractions of full, degrees.
+    """State of an axis on the page: fractions of full, -1 to 1; degrees; None if unknown.
 
     ``opening`` is the value of the valve frame, ``valve`` the speed it stands for.
     """
@@ -36,7 +36,7 @@ class AxisView:
     profile: str | None = None
 
     def values(self) -> dict[str, Any]:
-        """Return everything that the page shows."""
+        """Return what the page shows of the axis: rounded, with words for state and reason."""
         return {
             "joystick": rounded(self.joystick),
             "valve": rounded(self.valve),
@@ -49,16 +49,12 @@ class AxisView:
 
 
 def rounded(value: float | None, digits: int = 4) -> float | None:
-    """Return a number rounded for the page."""
+    """Return a number rounded for the page; None stays None."""
     return None if value is None else round(value, digits)
 
 
 class Sources:
-    """Times of the frames of each source.
-
-    Args:
-        names: the sources, in the order of the page.
-    """
+    """Times of the frames of each source; ``names`` are the sources in the order of the page."""
 
     def __init__(self, names: Iterable[str]) -> None:
         self._times_s = {name: deque[float](maxlen=MOST_FRAMES) for name in names}
@@ -73,7 +69,7 @@ class Sources:
         return now_s - times_s[-1] if times_s else None
 
     def values(self, now_s: float) -> dict[str, Any]:
-        """Return, by source, the frames in the last second and the age of the last frame, s."""
+        """Return by source ``per_s``, frames in the last second, and ``age_s`` of the last one."""
         values = {}
         for name, times_s in self._times_s.items():
             age_s = self.age_s(name, now_s)
@@ -102,15 +98,15 @@ LEAST_SWING_S = 1.0
 
 
 def sway_of(coordinates: Mapping[str, str]) -> dict[str, str]:
-    """Return the swing that each axis excites, by axis: across boom or bridge, or along it."""
+    """Return by axis the swing that it excites, across boom or bridge or along it, if any."""
     return {axis: _SWAY_OF[moved] for axis, moved in coordinates.items() if moved in _SWAY_OF}
 
 
 class Swing:
-    """Largest sway in any direction over one full swing, and its duration after a release.
+    """Largest sway in any direction over one full swing, and how long it lasts after a release.
 
     Args:
-        models: sway models of the deployment; the longest period counts.
+        models: sway models; a full swing is the longest of their periods and ``LEAST_SWING_S``.
         still_deg: swing below which the grapple counts as still.
     """
 
@@ -131,7 +127,7 @@ class Swing:
             self._over_s = now_s
 
     def move(self, now_s: float, *, moved: bool, drives: bool) -> None:
-        """Take the present state; ``moved``: a joystick is deflected, ``drives``: a valve open."""
+        """Note press or release; ``moved``: a joystick is deflected, ``drives``: a valve open."""
         if moved:
             self._released_s = None
             self._drove = drives or (self._moved and self._drove)
@@ -140,11 +136,10 @@ class Swing:
         self._moved = moved
 
     def still_s(self, now_s: float) -> tuple[float | None, bool]:
-        """Return the time in s from release to the last sway above the bound, and if it goes on.
+        """Return the time in s from release to the last sway of ``still_deg``, and if it goes on.
 
         The time is None before a release, while a joystick is deflected, and after a press that
-        opened no valve. The swing is over when no sway above the bound came for as long as a full
-        swing.
+        opened no valve. The swing is over when no such sway has come for one full swing.
         """
         if self._released_s is None:
             return None, False
@@ -156,7 +151,7 @@ class Swing:
         self._over_s, self._released_s, self._moved = -math.inf, None, False
 
     def largest_deg(self, now_s: float) -> float | None:
-        """Return the largest sway within the last full swing, degrees; None before the first."""
+        """Return the largest sway within the last full swing, degrees; None if none came in it."""
         while self._sways and self._sways[0][0] < now_s - self._lasts_s:
             self._sways.popleft()
         return max((sway for _, sway in self._sways), default=None)
@@ -168,15 +163,16 @@ LENGTHS_PCT = tuple(range(-50, 101, 5))
 
 
 def residuals(deployment: Deployment, values: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """Return the residuals by axis, without axes that have no sway data or several filters.
+    """Return the swing that each filter leaves at other pendulum lengths.
 
     Args:
         deployment: the machine.
-        values: numbers in force that may differ from the file, by key.
+        values: numbers in force, by key as in the file; those of no axis are ignored.
 
     Returns:
-        By axis: ``lengths_m`` of a simple pendulum of the same period; ``left``, the fraction of
-        the swing without a filter; the length that the filter ``believes``; that of the ``file``.
+        By axis with sway data and a single filter: ``lengths_m`` of simple pendulums; ``left``, a
+        fraction of the swing without filter for each length; the length, m, that the filter
+        ``believes``; that of the ``file``.
     """
     by_axis: dict[str, dict[AxisKey, float]] = {}
     for text, number in values.items():

@@ -35,7 +35,7 @@ from canshaper.studio.stage import MACHINE, RAW, Stage
 from canshaper_sim.axes import LUFFING, OVERHEAD, TOWER, kind_of
 from canshaper_sim.crane import CraneParameters
 
-# Time limit of a request, from its first byte or from the end of the last answer, s.
+# Time limit for the head of a request, from the connection or the end of the last answer, s.
 REQUEST_S = 10.0
 # Head of a request; a browser sends some hundred bytes.
 MOST_HEAD_BYTES = 16_384
@@ -49,7 +49,7 @@ class BoundedHttp(H11Protocol):
     _overdue: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin a connection and wait for its first request."""
+        """Begin a connection; abort it if no head of a request is there in ``REQUEST_S``."""
         super().connection_made(transport)
         self._watch()
 
@@ -59,7 +59,7 @@ class BoundedHttp(H11Protocol):
         self._watch()
 
     def on_response_complete(self) -> None:
-        """End an answer and wait for the next request."""
+        """End an answer; abort the connection if no next head is there in ``REQUEST_S``."""
         super().on_response_complete()
         self._watch()
 
@@ -75,7 +75,7 @@ class BoundedHttp(H11Protocol):
         super().connection_lost(exc)
 
     def _watch(self) -> None:
-        """Let the time limit run while no request is being answered."""
+        """Let the time limit run unless a request is being answered or a page has connected."""
         answering = self.cycle is not None and not self.cycle.response_complete
         if answering or self.transport.is_closing() or self.transport.get_protocol() is not self:
             self._cancel()
@@ -104,14 +104,7 @@ HEADERS = {
 def build_app(
     stage: Stage, access: Access, parameters: CraneParameters, commission: Commission
 ) -> ASGIApp:
-    """Return the page of a stage.
-
-    Args:
-        stage: the cranes that the page drives or watches.
-        access: rules for who may see the page.
-        parameters: the crane to draw.
-        commission: commissioning of the stage's file.
-    """
+    """Return the live page of a stage, which draws ``parameters``, and that of commissioning."""
 
     def left(_request: HTTPConnection) -> Response:
         return JSONResponse(residuals(stage.deployment, stage.in_force()))
@@ -122,7 +115,7 @@ def build_app(
 
 
 def pages_of(stage: Stage, hello: dict[str, Any]) -> BaseRoute:
-    """Return the route for the pages of a stage; ``hello`` is the first message to each page."""
+    """Return the route for at most ``MOST_PAGES`` pages; ``hello`` is the first message to each."""
     numbers = itertools.count(1)
     open_pages: set[int] = set()
 
@@ -142,13 +135,7 @@ def pages_of(stage: Stage, hello: dict[str, Any]) -> BaseRoute:
 
 
 def page_app(routes: Sequence[BaseRoute], script: str, access: Access) -> ASGIApp:
-    """Return the page with this script.
-
-    Args:
-        routes: routes for the requests of the script.
-        script: name of its file.
-        access: rules for who may see the page.
-    """
+    """Return the page with this script, a file of ``STATIC``, and routes for its requests."""
 
     async def page(_request: HTTPConnection) -> Response:
         return FileResponse(STATIC / "index.html")
@@ -162,14 +149,14 @@ def page_app(routes: Sequence[BaseRoute], script: str, access: Access) -> ASGIAp
 
 
 class Guard:
-    """Refuses requests against the rules of access, and adds the headers to every answer."""
+    """Refuses requests against the rules of access (403); adds ``HEADERS`` to other answers."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
         self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request or connection."""
+        """Serve or refuse a request or connection; a token in its URL goes into a cookie."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -208,7 +195,7 @@ def _with_headers(send: Send) -> Send:
 
 
 def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
-    """Return the first message to a page: cranes, controls, and the lengths of the links."""
+    """Return the first message to a page: cranes, controls, sliders, and ``drawn_of``."""
     return {
         "version": __version__,
         "file": stage.deployment.path.name,
@@ -231,9 +218,9 @@ def hello_of(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
 def drawn_of(parameters: CraneParameters, deployment: Deployment) -> dict[str, Any]:
     """Return the data for a page's drawing: lengths of links, and the swing that each axis excites.
 
-    For an overhead crane ``hall`` has the lengths of runway, bridge, rope and sling; for others it
-    is None. The picture of a multicopter (``drawn``) is scaled by its rope.
-    The boom of another crane with a rope is ``straight``; for a tower crane it is the jib.
+    Lengths are in m. For an overhead crane ``hall`` has those of runway, bridge, rope and sling,
+    else None; a picture named in the file, as a multicopter's (``drawn``), is scaled by its rope.
+    The ``boom`` of a tower crane (its jib) and of a luffing crane is ``straight``.
     """
     coordinates, section = deployment.coordinates, deployment.config.crane
     drawn: str | None = getattr(section, "drawn", None)
@@ -261,21 +248,21 @@ def listening(host: str, port: int) -> socket.socket:
     """Return a socket on which the server listens.
 
     Raises:
-        OSError: the address cannot be used.
+        OSError: the address cannot be used, or is in use.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     return socket.create_server((host, port), family=family, backlog=64)
 
 
 def address(host: str, port: int, token: str | None) -> str:
-    """Return the address to open in a browser."""
+    """Return the URL to open in a browser, with the secret token if there is one."""
     name = f"[{host}]" if ":" in host else host
     query = f"?token={token}" if token else ""
     return str(URL(f"http://{name}:{port}/{query}"))
 
 
 def server(app: ASGIApp) -> uvicorn.Server:
-    """Return the server; its ``run(sockets=[...])`` serves until it is stopped."""
+    """Return a server that has not begun; its ``run(sockets=[...])`` serves until it is stopped."""
     config = uvicorn.Config(
         app,
         log_level="error",

@@ -25,7 +25,7 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.realtime import open_ports
 
 SHAPED, RAW, MACHINE = "shaped", "raw", "machine"
-"""The two simulated cranes, and the real one that is only listened to."""
+"""Names of the two simulated cranes, and of the real one that is only listened to."""
 WATCH_MS = 20
 MS = 1_000_000
 
@@ -56,7 +56,7 @@ class Stage:
         self._resets: list[threading.Thread] = []
 
     def watch(self, control: Path | None = None) -> None:
-        """Listen to the buses of the deployment; never send on them.
+        """Listen to the buses of the deployment as the crane ``MACHINE``; never send on them.
 
         Args:
             control: control socket of a daemon whose numbers the page may change, or None.
@@ -76,7 +76,7 @@ class Stage:
         changes: Sequence[str] = (),
         program: Sequence[str] = CANSHAPER,
     ) -> None:
-        """Put a simulated crane on each transport: the first shaped, the second raw.
+        """Put a simulated crane on each transport: the first shaped, the second without anti-sway.
 
         Args:
             transports: one or two buses.
@@ -111,8 +111,8 @@ class Stage:
 
         Args:
             changes: parameters of the cranes, NAME=VALUE.
-            crane: name of the crane to drive, if the deployment has several. There are no sliders
-                then: they would change the numbers of all cranes.
+            crane: name of the only crane to drive; None for all. With a name there are no sliders:
+                they would change the numbers of all cranes.
 
         Raises:
             DriveError: no simulated crane fits the deployment, or none has that name.
@@ -128,7 +128,7 @@ class Stage:
             self.cranes[name] = CraneSession(self._view(name), {}, shaped=name == SHAPED, here=here)
 
     def _seat(self) -> None:
-        """Make a driver's seat and the sliders."""
+        """Make a driver's seat, and the sliders if the file has a control section."""
         self.cab = Cab(self.deployment.axes, lambda text: self.events.add("page", text))
         self.sliders = sliders(self.deployment.config) if self.deployment.config.control else {}
         self.positions = dict.fromkeys(self.sliders, 1.0)
@@ -137,18 +137,14 @@ class Stage:
             self.positions[PREFERENCE] = AS_IN_FILE
 
     def start(self, failed: Callable[[], None]) -> None:
-        """Start the loop.
-
-        Args:
-            failed: called if an error ends the loop.
-        """
+        """Start the loop in its thread; it calls ``failed`` there if an error ends it."""
         self._failed = failed
         self._thread.start()
         if self.numbers:
             self.numbers.start()
 
     def stop(self) -> None:
-        """End the loop: set the joysticks to neutral, then end daemons, cranes and buses.
+        """End the loop: send neutral joysticks (not after an error), then end daemons and cranes.
 
         Raises:
             Exception: the error that ended the loop.
@@ -172,15 +168,16 @@ class Stage:
                 action(self.cab, time.monotonic())
 
     def other(self, page: int, message: Mapping[str, Any]) -> bool:
-        """Handle a message that only the page of a subclass sends; return whether it was one."""
+        """Return False; a subclass handles messages that only its page sends and returns True."""
         return False
 
     def slide(self, name: str, factor: float) -> None:
-        """Move a slider: change the numbers of the shaped crane's daemon, and wait for its answer.
+        """Change numbers (or filters: ``PREFERENCE``) of the shaped crane, and wait for its answer.
 
         Raises:
             ValueError: there is no such slider, or the factor is not allowed.
             ControlError: the daemon refuses or does not run.
+            ConfigError: the file with other filters cannot be written.
         """
         if name == PREFERENCE and self.preference:
             self._prefer(self.preference, factor)
@@ -198,7 +195,7 @@ class Stage:
         self.events.add(SHAPED, ", ".join(f"{key} = {v:.4g}" for key, v in changed.items()))
 
     def _prefer(self, preference: Preference, position: float) -> None:
-        """Write other filters into the daemon's file and let it reload; it takes them at rest."""
+        """Write filters into the daemon's file and let it reload; put the other sliders to 1."""
         shaped = self.cranes[SHAPED]
         with self._control_lock:
             self.deployment = preference.write(position)
@@ -211,7 +208,7 @@ class Stage:
         self.events.add(SHAPED, said("filters"))
 
     def in_force(self) -> dict[str, float]:
-        """Return the numbers that may differ from the file, by key."""
+        """Return the numbers that the page can change, by key, as the daemon has them now."""
         if self.numbers:
             return self.numbers.in_force()
         values_by_key: dict[str, float] = {}
@@ -220,7 +217,7 @@ class Stage:
         return values_by_key
 
     def _reset_sliders(self) -> None:
-        """Reset the sliders that the driver has moved: the next driver finds the file's numbers."""
+        """Put every slider back to the file's numbers, for the next driver."""
         for name, factor in list(self.positions.items()):
             rest = AS_IN_FILE if name == PREFERENCE else 1.0
             if factor != rest:
@@ -228,7 +225,7 @@ class Stage:
                     self.slide(name, rest)
 
     def snapshot(self) -> dict[str, Any]:
-        """Return the values that a page shows now."""
+        """Return what a page shows now: time ``t`` in s, seat, slider positions, cranes by name."""
         now_s = time.monotonic()
         with self._lock:
             cab = self.cab

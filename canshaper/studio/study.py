@@ -1,7 +1,8 @@
 """A study with people: its key and its tables, and the placements in their order. No clock.
 
 A placement begins with the first motion of the crane and ends with the driver's grip, hit or miss,
-as in ISO 9241-411. An aborted placement is not done; it comes again at the end of its part.
+as in ISO 9241-411. An aborted placement is not done; it comes again at the end of its part, or in
+its planned place if the study was interrupted.
 """
 
 import csv
@@ -32,16 +33,16 @@ class Key:
 
     Args:
         path: the key file; it is made if it does not exist.
-        settings: hash of the file of each setting, by name of the setting.
+        settings: hash of each setting's file, by name of the setting: one for each of ``LETTERS``.
         task: parameters of the task that everyone does.
 
     Attributes:
-        letters: name of the setting of each letter.
+        letters: name of the setting, by letter.
         seed: seed of the order of placements.
         mark: first 8 digits of the hash of the key file, repeated in each row of a table.
 
     Raises:
-        UsageError: the file is the key of another study.
+        UsageError: the file is no key, or that of other settings or another task.
     """
 
     def __init__(self, path: Path, settings: Mapping[str, str], task: Mapping[str, Any]) -> None:
@@ -62,10 +63,10 @@ class Key:
 
 
 def read_key(path: Path) -> dict[str, Any]:
-    """Read the settings of a study from its key.
+    """Return ``settings``, ``task``, ``letters`` and ``seed`` of a study from its key.
 
     Raises:
-        UsageError: the file is no key of a study.
+        UsageError: the file cannot be read, or is not JSON in base64.
     """
     try:
         found: dict[str, Any] = json.loads(b64decode(path.read_bytes()))
@@ -75,19 +76,19 @@ def read_key(path: Path) -> dict[str, Any]:
 
 
 def mark_of(path: Path) -> str:
-    """Return the first 8 digits of the hash of a key."""
+    """Return the first 8 hex digits of the SHA-256 of a key file."""
     return sha256(path.read_bytes()).hexdigest()[:8]
 
 
 class Table:
-    """Rows of a person, one per placement; each is on the disk before the next placement begins.
+    """Rows of a person, one per placement, done or aborted; each is at once on the disk.
 
     Args:
-        path: the file; a last row that was cut off is removed.
-        common: values of the columns that are equal in all rows.
+        path: the file, made if missing; a last row that was cut off is removed.
+        common: values by column that are equal in all rows; ``study`` is needed.
 
     Attributes:
-        rows: the written rows, as text by column.
+        rows: all rows of the file, as text by column.
 
     Raises:
         UsageError: the file is no such table, or belongs to another study.
@@ -100,7 +101,7 @@ class Table:
         self.rows = rows_of(path, common["study"])
 
     def add(self, **values: object) -> None:
-        """Write a row to the disk."""
+        """Write a row, values by column, to the disk and wait for it; other columns are empty."""
         row = {**dict.fromkeys(COLUMNS, ""), **self.common}
         row |= {k: f"{v:.3f}" if isinstance(v, float) else str(v) for k, v in values.items()}
         self.rows.append(row)
@@ -111,7 +112,7 @@ class Table:
 
 
 def rows_of(path: Path, study: str) -> list[dict[str, str]]:
-    """Return the rows of a table.
+    """Return the rows of a table, as text by column; ``study`` is the mark of the key.
 
     Raises:
         UsageError: the file is no table of this study.
@@ -134,7 +135,7 @@ LIMIT_S, HELD_UP_S = 60.0, 0.3  # longest placement, and standstill of this prog
 
 
 class Placement(NamedTuple):
-    """A target to reach; parts and numbers count from 1, and each part begins with its practice."""
+    """A target to reach; part, and number in it, count from 1; ``practice``: 1 if not counted."""
 
     part: int
     setting: str
@@ -150,9 +151,9 @@ def plan(
     """Return the place of every placement of a person: m ahead of the pillar and to its left.
 
     Args:
-        counts: numbers of practice placements and of counted placements for each setting: rounds
-            of all nine targets, each in random order.
-        start_m: start of the grapple, m from the pillar.
+        counts: numbers of practice and then of counted placements in each part, drawn in rounds of
+            all nine targets in random order.
+        start_m: start of the grapple, m straight ahead of the pillar.
         order: letters of the settings, in the order of the parts.
         seed: seed of the random order.
     """
@@ -180,13 +181,13 @@ def _place(source: random.Random, start_m: float, distance_m: float) -> tuple[fl
 
 
 class Session:
-    """A person at work.
+    """A person at work, from one placement to the next.
 
     Args:
-        planned: every placement with its place.
+        planned: every placement with its place, see ``plan``.
         break_s: least break between two parts, s.
-        table: the table that takes each placement; placements in it are done.
-        fresh: called with a setting; puts a crane with this setting at the start.
+        table: the table that takes each placement; those in it are done unless aborted.
+        fresh: called with the letter of a setting; puts a crane with it at the start.
 
     Attributes:
         phase: present phase: pause, ready, moving, shown or done.
@@ -211,7 +212,7 @@ class Session:
         self._swing_deg = 0.0
 
     def begin(self, now_s: float) -> None:
-        """End a pause that has lasted long enough."""
+        """End a pause if it has lasted long enough: put a crane at the start and show a target."""
         if self.phase == "pause" and now_s >= self._until_s:
             self._next(now_s)
 
@@ -222,7 +223,7 @@ class Session:
     def see(
         self, level: str, place: tuple[float, float] | None, swing_deg: float | None, now_s: float
     ) -> None:
-        """Take the page's level of the axes, and the grapple's place and swing, each tick."""
+        """Take level of all axes, place (m ahead, m left), swing each tick; abort after a stop."""
         held_up, self._seen_s = now_s - self._seen_s > HELD_UP_S, now_s
         self._place, self._swing_deg, lasts_s = place, swing_deg or 0.0, now_s - self._since_s
         if self.phase == "ready" and level == "move":
@@ -239,7 +240,7 @@ class Session:
             self.break_off("held" if held_up else "long", now_s)
 
     def grip(self, by: str, now_s: float) -> None:
-        """Close the grapple at its present place, which ends the placement."""
+        """End the placement under way where the grapple is, and write its row; else do nothing."""
         if self.phase != "moving" or self._place is None:
             return
         one = self._last = self._todo.pop(0)
@@ -252,7 +253,7 @@ class Session:
         self.phase, self._since_s = "shown", now_s
 
     def break_off(self, why: str, now_s: float) -> None:
-        """Abort the present placement; it counts as not done, and a pause follows."""
+        """Abort the placement under way, if any: write its row, pause, and do it again later."""
         if self.phase == "moving":
             one, seconds = self._todo.pop(0), now_s - self._since_s
             self._table.add(**one._asdict(), seconds=seconds, outcome=BROKEN, why=why)
@@ -260,7 +261,7 @@ class Session:
             self.phase, self._why, self._until_s = "pause", why, now_s
 
     def shown(self, now_s: float) -> dict[str, Any]:
-        """Return the state that the page shows, without the name of the setting."""
+        """Return what the page shows, without the setting; ``target``: m ahead, m left, width."""
         over = self.phase in ("shown", "done")
         one = self._last if over else self._todo[0]
         numbers, left = (

@@ -53,12 +53,12 @@ def bits(row: Mapping[str, str]) -> float:
 
 
 def log_s(rows: Rows) -> float:
-    """Return the mean logarithm of the seconds."""
+    """Return the mean natural logarithm of the seconds of at least one row."""
     return fmean(math.log(float(row["seconds"])) for row in rows)
 
 
 def person_table(rows: Rows) -> Table:
-    """Return a table of what a person did, a row for each filter setting (hidden by a letter)."""
+    """Return a person's figures, a row for each letter; "-" where all targets are equally hard."""
     heads = ("placed", "hit\n%", "seconds\ngeom. mean", "s a bit", "off\ncm", "swing\ndeg")
     drawn = new_table("setting", *heads, "practice", "broken off")
     for letter in LETTERS:
@@ -79,7 +79,7 @@ def person_table(rows: Rows) -> Table:
 
 
 def person_page(person: str, rows: Rows) -> str:
-    """Return the result of a person as an HTML file, without room for a name."""
+    """Return the text of an HTML file with a person's figures, without room for a name."""
     first = rows[0] if rows else {"study": "-", "order": "-"}
     facts = [("person", person), ("study", first["study"]), ("order", first["order"])]
     facts.append(("gripped by", ", ".join(sorted({r["input"] for r in rows if r["input"]}))))
@@ -89,12 +89,14 @@ def person_page(person: str, rows: Rows) -> str:
 
 
 def hits(rows: Rows) -> float:
-    """Return the fraction of placements that hit."""
+    """Return the fraction of rows, at least one, that hit."""
     return fmean(row["outcome"] == HIT for row in rows)
 
 
 def complete(folder: Path, study: str, placements: int) -> tuple[dict[str, Rows], list[str]]:
-    """Return the rows of each person who has done everything, and the codes of the others.
+    """Return by code the rows of each person who is done, and the codes of the others.
+
+    A table FOLDER/CODE.csv is done with so many counted ``placements`` of every setting.
 
     Raises:
         UsageError: a table does not belong to this study.
@@ -111,18 +113,18 @@ def complete(folder: Path, study: str, placements: int) -> tuple[dict[str, Rows]
 
 
 def changes(persons: Mapping[str, Rows], pair: tuple[str, str]) -> list[float]:
-    """Return each person's change of the mean logarithm, from the first setting to the second."""
+    """Return each person's change of ``log_s`` from the first letter of a pair to the second."""
     logs = ([log_s(counted(rows, letter)) for letter in pair] for rows in persons.values())
     return [after - before for before, after in logs]
 
 
 def spreads(persons: Mapping[str, Rows]) -> list[float]:
-    """Return the standard deviation over persons of the changes, for each pair; at least 0.001."""
+    """Return the standard deviation of two or more ``changes``, at least 0.001, for each pair."""
     return [max(0.001, stdev(changes(persons, pair))) for pair in PAIRS]
 
 
 def pairs_table(persons: Mapping[str, Rows], names: Mapping[str, str]) -> Table:
-    """Return a table with a row for each pair of settings: changes within persons, by bootstrap.
+    """Return a table with a row for each of ``PAIRS``: mean changes within persons, with bounds.
 
     Args:
         persons: rows of each person, at least three; each with rows that count of every setting.
@@ -145,7 +147,7 @@ def pairs_table(persons: Mapping[str, Rows], names: Mapping[str, str]) -> Table:
 
 
 def _bounds(values: Sequence[float]) -> tuple[float, float, float]:
-    """Return the mean of the differences within persons, and its bounds by the bootstrap."""
+    """Return mean, lower and upper bound (bootstrap, at ``CONFIDENCE``) of one value a person."""
     options: dict[str, Any] = {"method": "percentile", "random_state": np.random.default_rng(0)}
     result = stats.bootstrap((values,), np.mean, confidence_level=CONFIDENCE, **options)
     bounds = result.confidence_interval
@@ -153,7 +155,7 @@ def _bounds(values: Sequence[float]) -> tuple[float, float, float]:
 
 
 def power(persons: int, change_pct: float, spread: float) -> float:
-    """Return the chance that so many persons show a change: two-sided paired t test at 5 %."""
+    """Return the chance that so many persons show times shorter by change_pct: paired t, 5 %."""
     free = persons - 1
     shift = abs(math.log1p(-change_pct / 100.0)) / spread * math.sqrt(persons)
     limit = stats.t.ppf(0.5 + CONFIDENCE / 2.0, free)
@@ -161,7 +163,7 @@ def power(persons: int, change_pct: float, spread: float) -> float:
 
 
 def power_table(spread: float) -> Table:
-    """Return a table of the chance to show a change, by number of persons and size of change."""
+    """Return a table of ``power``, %: a row for each number of persons, one column a change."""
     heads = (f"{change} %" for change in CHANGES_PCT)
     drawn = new_table("persons", *heads, title=f"power, %, if quicker by; spread {spread:.3f}")
     for persons in PERSONS:

@@ -41,12 +41,12 @@ _OF_FILTERS = ("gain_schedule", "profiles", "sway_sensor")
 
 
 def setting(path: Path, folder: Path, *, raw: bool = False) -> Deployment:
-    """Return a deployment for a study: without switches for anti-sway or profiles.
+    """Write a copy of a file without switches for anti-sway or profiles; return its deployment.
 
     Args:
         path: the file.
         folder: folder for a copy of the file.
-        raw: also without filters, for a drive without anti-sway.
+        raw: also without filters and motions, for a drive without anti-sway.
 
     Raises:
         ConfigError: the file or its copy is not valid.
@@ -76,6 +76,9 @@ class RealJoysticks(HeldHand):
         deployment: the machine of the buses and joysticks.
         grip: button that grips, as MESSAGE.SIGNAL; None for that of the page.
 
+    Attributes:
+        gripped: the button was pressed; whoever reads it sets it to False.
+
     Raises:
         BusError: a bus cannot be opened.
         UsageError: the DBC files have no such signal.
@@ -92,7 +95,7 @@ class RealJoysticks(HeldHand):
         self.ports = open_ports(deployment)
 
     def frames_of_tick(self, time_ms: int, _tick_ms: int) -> list[Frame]:
-        """Return the waiting frames of joysticks and switches; note a press of the grip button."""
+        """Return the waiting joystick and switch frames, drop others; note a press of the grip."""
         waiting = [frame for port in self.ports.values() for frame in port.frames()]
         for frame in waiting:
             self._watch(frame)
@@ -127,14 +130,14 @@ class StudyStage(Stage):
     """A person and the crane of a study.
 
     Args:
-        settings: deployment of each letter.
-        planned: every placement with its place.
+        settings: deployment by letter.
+        planned: every placement with its place, see ``plan``.
         break_s: least break between two parts, s.
         table: the table that takes the placements.
         parameters: the crane.
         changes: the changes that give ``parameters``, NAME=VALUE.
         joysticks: joysticks of a machine; None for those of the page.
-        done: called when all placements are done.
+        done: called once, from the loop, when all placements are done.
 
     Raises:
         DriveError: no simulated crane fits the deployments.
@@ -160,7 +163,7 @@ class StudyStage(Stage):
         self._put(next(iter(planned)).setting)
 
     def _put(self, letter: str) -> None:
-        """Put a crane with this setting at the start."""
+        """Replace the crane by one with this setting, at rest in its start pose."""
         deployment = self._settings[letter]
         # The messages of its daemon would name the setting.
         view = CraneView(deployment, lambda _text, _level: None)
@@ -169,7 +172,7 @@ class StudyStage(Stage):
         self.cranes = {CRANE: CraneSession(view, {}, here=here)}
 
     def other(self, page: int, message: Mapping[str, Any]) -> bool:
-        """Take a message that only the page of a study sends; return whether it was one."""
+        """Take a message of a study (ignored unless the page drives); return whether it is one."""
         word, by, why = (message.get(name) for name in ("study", "by", "why"))
         known = {"begin": True, "grip": by in INPUTS, "broken": why in WHY}
         if not isinstance(word, str) or not known.get(word):
@@ -189,7 +192,7 @@ class StudyStage(Stage):
         return True
 
     def snapshot(self) -> dict[str, Any]:
-        """Return the values for the page; of the axes it shows only the joysticks."""
+        """Return what the page shows; of the axes only the joysticks, to hide the setting."""
         shown = super().snapshot()
         crane = shown["cranes"][CRANE]
         level, why = _urgent(crane["axes"])
@@ -227,7 +230,7 @@ class StudyStage(Stage):
 
 
 def _urgent(axes: Mapping[str, Mapping[str, Any]]) -> tuple[str, str]:
-    """Return the most urgent level of all axes, and its reason; no reason if the axis may move."""
+    """Return the most urgent level of all axes, and its reason; none for move and ready."""
     by_level = {one["level"]: one["reason"] for one in axes.values()}
     for level in ("bad", "stop", "move", "wait"):
         if level in by_level:

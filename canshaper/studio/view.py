@@ -20,7 +20,7 @@ from canshaper.studio.words import fault_words, reason_words, said, state_level,
 from canshaper_sim.axes import BRIDGE, SLEW, TROLLEY
 
 SILENT_S = 0.5
-"""A daemon or a crane that has sent nothing for so long is shown as silent."""
+"""A daemon or a crane that has sent nothing for so long, s, is shown as silent."""
 
 _JOINTS, _TROLLEY = ("LiftAngle", "KnuckleAngle", "Extension"), ("Bridge", "Trolley", "RopeLength")
 # Axes on which the predicted sway has the other sign: the load lags behind the tip.
@@ -32,10 +32,10 @@ Report = Callable[[str, str], None]
 
 
 class CraneView:
-    """Takes every frame of a bus and keeps the last value of each quantity.
+    """Takes every frame of a crane's buses and keeps the last value of each quantity.
 
     Args:
-        deployment: names the messages.
+        deployment: names the messages and their buses.
         report: called with text and level of each event.
     """
 
@@ -104,7 +104,7 @@ class CraneView:
         self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame, also one that the page's joysticks sent; ignore unknown frames."""
+        """Take a frame, also of the page's joysticks; ignore unknown and too short ones."""
         entries = self._handlers.get(frame[:3])
         if joystick := self._joysticks.find(frame, round(now_s * 1e9)):
             entries = [*(entries or ()), (self._joystick, joystick, _source_of(joystick))]
@@ -127,7 +127,14 @@ class CraneView:
         sway_deg: tuple[float, float],
         now_s: float,
     ) -> None:
-        """Take pose and sway from a simulated crane that is on no bus: they are not measured."""
+        """Take values of a simulated crane that is on no bus, so they do not count as measured.
+
+        Args:
+            pose: slewed angle in degrees, radius and height in m.
+            joints: lift and knuckle in degrees, extension in m; None for a crane without them.
+            sway_deg: sway across and along the boom, degrees.
+            now_s: time, s.
+        """
         self.simulated = True
         self.pose, self.joints = pose, joints
         self._sway_at(sway_deg, now_s)
@@ -137,9 +144,9 @@ class CraneView:
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:
-        """Report that the daemon or the crane has fallen silent or is back.
+        """Report that the crane falls silent, or that the daemon falls silent or is back.
 
-        Forget joystick positions that are too old.
+        Forget what a silent crane, daemon or joystick has sent last: sway, axes, positions.
         """
         for joystick in self.deployment.joysticks.values():
             age_s = self.sources.age_s(_source_of(joystick), now_s)
@@ -164,19 +171,19 @@ class CraneView:
 
     @property
     def received_any(self) -> bool:
-        """True if the daemon or the crane has ever sent a frame."""
+        """True if ``daemon_there`` or ``crane_there`` has ever been true."""
         return max(self._daemon_s, self._crane_s) > -math.inf
 
     def daemon_there(self, now_s: float) -> bool:
-        """Return whether the daemon has sent a frame lately."""
+        """Return whether the daemon has sent a valve or status frame in the last ``SILENT_S``."""
         return now_s - self._daemon_s < SILENT_S
 
     def crane_there(self, now_s: float) -> bool:
-        """Return whether the crane itself has sent a frame lately."""
+        """Return whether the crane has sent pose, joints or sway in the last ``SILENT_S``."""
         return now_s - self._crane_s < SILENT_S
 
     def values(self, now_s: float) -> dict[str, Any]:
-        """Return everything that the page shows."""
+        """Return everything that the page shows of the crane, by name; None for what is unknown."""
         still_s, swings = self._swing.still_s(now_s)
         return {
             "daemon": self.daemon_there(now_s),
@@ -201,7 +208,7 @@ class CraneView:
         }
 
     def _predicted(self) -> tuple[float, float] | None:
-        """Return the sway that the daemon predicts, for a page without measured sway."""
+        """Return the predicted sway (across, along), degrees; None if no axis has a prediction."""
         predicted = {ACROSS: 0.0, ALONG: 0.0}
         known = False
         for name, axis in self.axes.items():
@@ -222,7 +229,7 @@ class CraneView:
         self._swing.move(now_s, moved=moved, drives=any(a.valve for a in self.axes.values()))
 
     def _joystick_at(self, joystick: str, commands: Mapping[str, float | Reason]) -> None:
-        """Keep the demand of a joystick by axis; an invalid or missing one becomes None."""
+        """Keep a joystick's demand (by signal) for its axes; an invalid or missing one is None."""
         for name, axis in self.deployment.axes.items():
             if axis.config.command.joystick == joystick:
                 command = commands.get(axis.config.command.signal)

@@ -28,22 +28,17 @@ def _texts() -> dict[str, str]:
 
 
 def said(what: str, **values: object) -> str:
-    """Return a message of the studio in English; the page shows it in the reader's language.
-
-    Args:
-        what: key of the text in the tables of the page, without its prefix "said.".
-        values: values that the text shows, by name.
-    """
+    """Return the page's text "said.WHAT" in English, with values by name; pages translate it."""
     return _texts()[f"said.{what}"].format(**values)
 
 
 def state_words(number: int) -> str:
-    """Return the words for a state number."""
+    """Return the words for a state number; "state N" for one that does not exist."""
     return STATE_TEXTS[State(number)].words if number in _STATES else f"state {number}"
 
 
 def state_level(state: int | None) -> str:
-    """Return the level that shows a state: off, wait, ready, move, stop or bad."""
+    """Return the page's level of a state: off (None), wait, ready, move, stop or bad."""
     if state == State.TRIPPED:
         return "bad"
     if state == State.STOPPING:
@@ -54,12 +49,12 @@ def state_level(state: int | None) -> str:
 
 
 def reason_words(number: int) -> str:
-    """Return the words for a reason number."""
+    """Return the words for a reason number; "reason N" for one that does not exist."""
     return REASON_TEXTS[Reason(number)].words if number in _REASONS else f"reason {number}"
 
 
 def fault_words(number: int) -> str:
-    """Return the words for a fault number; an empty text for no fault."""
+    """Return the words for a fault number: "" for no fault, "fault N" for an unknown one."""
     return FAULTS[FrameFault(number)] if number in _FAULTS else f"fault {number}"
 
 
@@ -67,7 +62,7 @@ _STATES, _REASONS, _FAULTS = frozenset(State), frozenset(Reason), frozenset(Fram
 
 
 MOST = 500
-"""Events kept for a page that opens later."""
+"""Events kept for a page that opens later; older ones are dropped."""
 
 
 class Event(NamedTuple):
@@ -99,13 +94,13 @@ class Events:
         self._count = 0
 
     def add(self, source: str, text: str, level: str = "info") -> None:
-        """Add an event."""
+        """Add an event of now; for the arguments see ``Event``."""
         clock_s = time.monotonic()
         with self._lock:
             self._count += 1
             self._events.append(Event(self._count, time.time(), source, text, level, clock_s))
 
     def since(self, number: int) -> list[Event]:
-        """Return the events after this one, in order."""
+        """Return the kept events with a higher number, oldest first."""
         with self._lock:
             return [event for event in self._events if event.number > number]

@@ -1,5 +1,6 @@
 """The slider from quicker to calmer: its ends, what it says, and what the daemon then has."""
 
+import asyncio
 import json
 import shutil
 from collections.abc import Callable
@@ -15,9 +16,11 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shipped import deployment_path
 from canshaper.studio import preference
+from canshaper.studio.client import Client
 from canshaper.studio.crane import copied
 from canshaper.studio.in_process import InProcessCrane
 from canshaper.studio.preference import AS_IN_FILE, PREFERENCE, Preference, offered
+from canshaper.studio.stage import Stage
 from canshaper_sim.hand import Held
 from tests.studio.conftest import Studio
 from tests.studio.page import WAIT_S
@@ -169,6 +172,42 @@ def test_the_daemon_takes_it_and_the_next_driver_has_that_of_the_file(
     with studio.page() as page:
         page.until(lambda s: s["sliders"][PREFERENCE] == AS_IN_FILE, "that of the file")
         assert asked("residuals") == before
+
+
+class Driving:
+    """A connection whose page takes the seat, asks for other filters, and goes once refused."""
+
+    def __init__(self) -> None:
+        texts = [{"do": "take"}, {"slide": PREFERENCE, "to": AS_IN_FILE}]
+        self._messages = [{"type": "websocket.receive", "text": json.dumps(one)} for one in texts]
+        self._answered = asyncio.Event()
+        self.refused: list[str] = []
+
+    async def receive(self) -> dict[str, Any]:
+        if self._messages:
+            return self._messages.pop(0)
+        await self._answered.wait()
+        return {"type": "websocket.disconnect"}
+
+    async def send_text(self, text: str) -> None:
+        if refused := json.loads(text).get("refused"):
+            self.refused += refused
+            self._answered.set()
+
+
+def test_filters_that_cannot_be_written_are_refused_and_the_page_goes_on(tmp_path: Path) -> None:
+    """The copy is gone, as after a clean-up of the folder for temporary files."""
+    path, deployment = copy(tmp_path / "copy")
+    stage = Stage(deployment)
+    stage.drive_here()
+    path.unlink()
+
+    async def serve() -> list[str]:
+        page: Any = Driving()
+        await asyncio.wait_for(Client(page, stage, 1, {}).serve(), WAIT_S)
+        return page.refused  # type: ignore[no-any-return]
+
+    assert [text for text in asyncio.run(serve()) if "No such file" in text]
 
 
 def test_a_process_that_cannot_read_the_file_offers_nothing(tmp_path: Path) -> None:
