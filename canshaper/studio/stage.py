@@ -1,6 +1,5 @@
 """The loop behind the page: every 20 ms it sends joysticks and reads frames, in its own thread."""
 
-import contextlib
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +10,7 @@ from canshaper.commissioning import control_client as client
 from canshaper.commissioning.doctor.processes import before_the_rest
 from canshaper.design.lockstep import driven_part
 from canshaper.design.processes import Transport, on_transport
-from canshaper.errors import ControlError
+from canshaper.errors import ConfigError, ControlError
 from canshaper.gate.cycle import run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
@@ -221,8 +220,12 @@ class Stage:
         for name, factor in list(self.positions.items()):
             rest = AS_IN_FILE if name == PREFERENCE else 1.0
             if factor != rest:
-                with contextlib.suppress(ControlError):  # a new daemon has the file's numbers
+                try:
                     self.slide(name, rest)
+                except ControlError:
+                    pass  # a new daemon has the file's numbers
+                except ConfigError as error:
+                    self.events.add(MACHINE, str(error), "warn")
 
     def snapshot(self) -> dict[str, Any]:
         """Return what a page shows now: time ``t`` in s, seat, slider positions, cranes by name."""

@@ -66,13 +66,13 @@ def read_key(path: Path) -> dict[str, Any]:
     """Return ``settings``, ``task``, ``letters`` and ``seed`` of a study from its key.
 
     Raises:
-        UsageError: the file cannot be read, or is not JSON in base64.
+        UsageError: the file cannot be read, or has not these in JSON in base64.
     """
     try:
-        found: dict[str, Any] = json.loads(b64decode(path.read_bytes()))
-    except (OSError, ValueError) as error:
+        found = json.loads(b64decode(path.read_bytes()))
+        return {name: found[name] for name in ("settings", "task", "letters", "seed")}
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise UsageError(f"{path}: expected the key of a study: {error}") from None
-    return found
 
 
 def mark_of(path: Path) -> str:

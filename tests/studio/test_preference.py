@@ -208,6 +208,10 @@ def test_filters_that_cannot_be_written_are_refused_and_the_page_goes_on(tmp_pat
         return page.refused  # type: ignore[no-any-return]
 
     assert [text for text in asyncio.run(serve()) if "No such file" in text]
+    stage.positions[PREFERENCE] = 0.5
+    stage._reset_sliders()  # for the next driver
+    assert [one.level for one in stage.events.since(0) if "No such file" in one.text] == ["warn"]
+    assert stage.positions[PREFERENCE] == 0.5
 
 
 def test_a_process_that_cannot_read_the_file_offers_nothing(tmp_path: Path) -> None:

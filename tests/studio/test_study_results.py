@@ -3,6 +3,7 @@
 import csv
 import math
 import random
+from base64 import b64encode
 from pathlib import Path
 
 import pytest
@@ -69,9 +70,10 @@ def test_the_key_is_sealed_and_that_of_one_study(tmp_path: Path) -> None:
         Key(tmp_path / KEY, settings | {"b.yaml": "3"}, task)
     with pytest.raises(UsageError, match="expected the task that the study began with"):
         Key(tmp_path / KEY, settings, task | {"practice": 3})
-    (tmp_path / KEY).write_text("{")
-    with pytest.raises(UsageError, match="expected the key of a study"):
-        read_key(tmp_path / KEY)
+    for text in (b"{", b64encode(b"{}"), b64encode(b"[]")):
+        (tmp_path / KEY).write_bytes(text)
+        with pytest.raises(UsageError, match="expected the key of a study"):
+            read_key(tmp_path / KEY)
 
 
 def joined(folder: Path, *options: str) -> str:
