@@ -208,6 +208,20 @@ def test_a_drive_of_the_second_file_is_looked_at_with_the_ranges_of_the_first(
 
 
 @pytest.mark.slow
+def test_the_drive_lasts_as_long_as_in_the_campaign_where_the_other_file_has_longer_tails(
+    tmp_path: Path,
+) -> None:
+    first = str(machine_file(tmp_path, "forwarder", ("tail_s: 2.0", "tail_s: 6.0")))
+    drives = ("-n", "2", "--processes", "1", "--out", str(tmp_path / "drives"))
+    assert campaign(first, "--against", PLAIN, *drives).exit_code == 0
+    row = rows(tmp_path / "drives" / "b-forwarder")[1]
+    looked = invoke("demo", PLAIN, "--seed", "1", "--ranges", first, "--out", str(tmp_path))
+    assert looked.exit_code == 0
+    shaped = json.loads((tmp_path / "report.json").read_text())["crane"]["shaped"]
+    assert shaped["residual_deg"] == pytest.approx(row["residual_deg"], abs=0.02)
+
+
+@pytest.mark.slow
 def test_files_with_other_axes_are_not_compared(tmp_path: Path) -> None:
     joints = str(CONFIG / "forwarder-joints.yaml")
     line = (
