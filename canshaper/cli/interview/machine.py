@@ -202,10 +202,7 @@ def _joystick(
 
 
 def _times_ms(message: Message, before: Sequence[FirstJoystick]) -> tuple[int, int | None]:
-    """Return the timeout (ms) of a message, and its cycle (ms) if the DBC states none.
-
-    It asks for a cycle that no joystick so far has.
-    """
+    """Return the timeout of a message, and its cycle if the DBC states none, asked once; in ms."""
     known = {one.switch: one.switch_ms[1] for one in before}
     known |= {one.message: one.cycle_ms for one in before}
     cycle = message.cycle_time or known.get(message.name) or period_ms(message.name)
