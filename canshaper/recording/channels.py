@@ -152,7 +152,8 @@ class Place:
     def checked(self, frame: TimedFrame, length: int) -> TimedFrame:
         """Return the frame; raise LogError for another length or an id that does not fit."""
         if len(frame.data) != length or length > MOST_BYTES:
-            raise self.error(f"{len(frame.data)} of {length} bytes", "all of them")
+            expected = "all of them" if length <= MOST_BYTES else f"{MOST_BYTES} at most"
+            raise self.error(f"{len(frame.data)} of {length} bytes", expected)
         if not fits(frame.can_id, extended=frame.extended):
             expected = "an id of 11 bits, or of an extended frame of 29"
             raise self.error(f"id {frame.can_id:#x}", expected)

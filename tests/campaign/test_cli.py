@@ -191,10 +191,11 @@ def test_the_worst_drive_can_be_looked_at(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_drive_of_the_second_file_is_looked_at_with_the_ranges_of_the_first(
+def test_a_drive_of_the_second_file_is_looked_at_with_ranges_and_tails_of_the_first(
     tmp_path: Path,
 ) -> None:
-    first, second = machine(tmp_path, "uncertainty: { length_pct: [10, 15] }"), PLAIN
+    more, longer = "\nuncertainty: { length_pct: [10, 15] }\n", ("tail_s: 2.0", "tail_s: 6.0")
+    first, second = str(machine_file(tmp_path, "forwarder", longer, more=more)), PLAIN
     drives = ("-n", "2", "--processes", "1", "--out", str(tmp_path / "drives"))
     assert campaign(first, "--against", second, *drives).exit_code == 0
     row = rows(tmp_path / "drives" / "b-forwarder")[1]
@@ -204,6 +205,7 @@ def test_a_drive_of_the_second_file_is_looked_at_with_the_ranges_of_the_first(
         assert invoke(*looked).exit_code == 0
         peaks.append(json.loads((tmp_path / "report.json").read_text())["crane"]["shaped"])
     assert peaks[1]["peak_deg"] == pytest.approx(row["peak_deg"], abs=0.02)
+    assert peaks[1]["residual_deg"] == pytest.approx(row["residual_deg"], abs=0.02)
     assert peaks[0]["peak_deg"] != pytest.approx(row["peak_deg"], abs=0.02)
 
 

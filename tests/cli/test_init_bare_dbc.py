@@ -20,6 +20,7 @@ def test_what_the_dbc_does_not_say_is_asked(tmp_path: Path) -> None:
         "Stick",
         "10",
         "",
+        "100",
         "",
         "",
         "boom",
@@ -41,6 +42,7 @@ def test_what_the_dbc_does_not_say_is_asked(tmp_path: Path) -> None:
         "Messages of the joysticks, such as Stick",
         "Stick: period in ms, which the DBC does not say",
         "Stick: enable switch, such as Panel.Enable",
+        "Panel: period in ms, which the DBC does not say",
         "Boom: period in ms, which the DBC does not say",
         "X: its value at full",
         "Flow: its value at full",
@@ -49,7 +51,8 @@ def test_what_the_dbc_does_not_say_is_asked(tmp_path: Path) -> None:
     deployment = load_deployment(file)
     joystick = deployment.config.joysticks["stick"]
     assert (joystick.cycle_ms, joystick.enable) == (10, ["stick_enable"])
-    assert deployment.config.switches["stick_enable"].message == "Panel"
+    switch = deployment.config.switches["stick_enable"]
+    assert (switch.message, switch.cycle_ms, switch.timeout_ms) == ("Panel", 100, 500)
     axis = deployment.config.axes["boom"]
     assert (axis.command.full, axis.valve.full, axis.valve.cycle_ms) == (100.0, 1000.0, 20)
     assert (axis.command.invert, axis.valve.invert) == (True, False)
@@ -69,7 +72,7 @@ def test_a_state_of_another_ecu_may_enable_by_one_of_its_named_values(
     dbc, file = tmp_path / "bare.dbc", tmp_path / "machine.yaml"
     text = BARE.replace("Enable : 0|1", "Mode : 0|4") + MODES[names]
     dbc.write_text(text, encoding="cp1252")
-    replies = ["", "", "", "Stick", "10", "Panel.Mode", reply, "", ""]
+    replies = ["", "", "", "Stick", "10", "Panel.Mode", reply, "", "", ""]
     replies += ["boom", "Boom.Flow", "20", "100", "y", "1000", "", "", "n", "-"]
     if names == "several":
         replies.insert(6, "")  # no answer is none

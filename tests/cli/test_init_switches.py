@@ -62,6 +62,42 @@ def test_a_bit_of_another_message_may_enable(tmp_path: Path) -> None:
     assert switches.layout.decode(b"\x04") == {"Keys/2": 1}
 
 
+@pytest.mark.parametrize("cab_ms", [20, 0])
+def test_a_switch_elsewhere_has_the_cycle_of_its_own_message(tmp_path: Path, cab_ms: int) -> None:
+    dbc = made(tmp_path, OTHER)
+    cycles = 'BA_ "GenMsgCycleTime" BO_ 256 {};\nBA_ "GenMsgCycleTime" BO_ 257 100;\n'
+    dbc.write_text(dbc.read_text() + cycles.format(cab_ms))
+    answers = "Cab: enable switch = Panel.Keys/2\n" + "Cab: period = 20\n" * (not cab_ms)
+    result = of_dbc(tmp_path, [dbc], answers)
+    assert result.exit_code == 0, result.output
+    config = load_deployment(tmp_path / "machine.yaml").config
+    cab, panel = config.joysticks["cab"], config.switches["cab_enable"]
+    assert (cab.cycle_ms, cab.timeout_ms) == (None if cab_ms else 20, 100)
+    assert (panel.cycle_ms, panel.timeout_ms) == (None, 500)
+
+
+@pytest.mark.parametrize("right", ["Panel.Keys/3", "cab"])
+def test_stop_distances_count_on_a_slow_switch_whose_period_is_asked_once(
+    tmp_path: Path, right: str
+) -> None:
+    second = '\nBO_ 258 Right: 8 CAB\n SG_ NearFar : 0|8@1- (1,0) [-100|100] "%" PC\n'
+    second += '\nBO_ 513 NearFarValve: 2 PC\n SG_ V : 0|8@1- (0.8,0) [-100|100] "%" VALVES\n'
+    text = made(tmp_path, OTHER).read_text().replace("\nBA_DEF_ ", f"{second}\nBA_DEF_ ", 1)
+    distances: list[list[float]] = []
+    for panel_ms in (20, 200):
+        (folder := tmp_path / str(panel_ms)).mkdir()
+        (dbc := folder / "cab.dbc").write_text(text + 'BA_ "GenMsgCycleTime" BO_ 257 0;\n')
+        answers = f"Messages of the joysticks = Cab Right\nPanel: period = {panel_ms}\n"
+        answers += f"Cab: enable switch = Panel.Keys/2\nRight: enable switch = {right}\n"
+        assert of_dbc(folder, [dbc], answers).exit_code == 0
+        config = load_deployment(folder / "machine.yaml").config
+        times = {(one.cycle_ms, one.timeout_ms) for one in config.switches.values()}
+        assert times == {(panel_ms, 5 * panel_ms)}
+        distances += [[one.limits.stop_distance_m or 0.0 for one in config.axes.values()]]
+    assert [len(one) for one in distances] == [2, 2]
+    assert all(fast < slow for fast, slow in zip(*distances, strict=True))
+
+
 @pytest.mark.parametrize(("switch", "answer"), [("", ""), (BUTTONS, "-"), (OTHER, "-")])
 def test_without_a_switch_a_draft_names_the_ways_out(
     tmp_path: Path, switch: str, answer: str

@@ -136,6 +136,7 @@ def test_candump_with_a_date(tmp_path: Path) -> None:
         ("  can0  110   [2]  0A FF", "expected times before the frames: candump -L, or candump -t"),
         (" (now)  can0  110   [2]  0A FF", "expected times before the frames"),
         (" (1.0)  can0  110   [2]  0A", "expected all of them, got 1 of 2 bytes"),
+        (" (1.0)  can0  110  [65] " + " 0A" * 65, "expected 64 at most, got 65 of 65 bytes"),
         (" (1.0)  can0  FFF   [1]  0A", "got id 0xfff"),
         (" (1.0)  can0  FFFF  [1]  0A", "expected a line of candump -L"),
     ],

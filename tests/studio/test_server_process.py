@@ -12,6 +12,7 @@ import pytest
 
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
+from tests.cli.invocation import invoke
 from tests.studio.conftest import ROOT, Listener, Studio, command_of
 from tests.studio.page import WAIT_S
 
@@ -77,6 +78,13 @@ def test_a_channel_of_a_real_machine_is_refused() -> None:
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "would move a real machine" in done.stderr
+
+
+@pytest.mark.parametrize("options", ["socketcan", "pcan --channel vcan0"])
+def test_an_interface_that_no_simulated_crane_would_use_is_refused(options: str) -> None:
+    refused = invoke("studio", "--interface", *options.split())
+    text = "--interface: expected udp_multicast, or socketcan with --channel, got"
+    assert (refused.exit_code, refused.output) == (2, f"{text} {options.split(maxsplit=1)[0]!r}\n")
 
 
 @pytest.mark.slow

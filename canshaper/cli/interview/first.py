@@ -33,6 +33,7 @@ class FirstJoystick:
         enable, reset, anti_sway_off: signals of its switches; a bit of one is SIGNAL/BIT.
         cycle_ms: cycle of its message if the DBC states none.
         switch: message of its enable switch if that is another one.
+        switch_ms: timeout of that message, and its cycle if the DBC states none.
         code: value of ``enable`` that enables, if its values have names.
         enable_of: joystick whose switch enables this one.
         node: its CANopen node, if that has a heartbeat.
@@ -48,6 +49,7 @@ class FirstJoystick:
     alive_counter: str | None = None
     cycle_ms: int | None = None
     switch: str | None = None
+    switch_ms: tuple[int, int | None] = (0, None)
     node: str | None = None
     enable_of: str | None = None
     multiplexor: int | None = None

@@ -76,9 +76,11 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     yield ""
     yield from _switches(machine)
     yield "axes:"
-    timeouts_ms = {joystick.name: joystick.timeout_ms for joystick in machine.joysticks}
+    longest_ms = {one.name: max(one.timeout_ms, one.switch_ms[0]) for one in machine.joysticks}
+    for one in machine.joysticks:
+        longest_ms[one.name] = max(one.timeout_ms, longest_ms[one.enable_of or one.name])
     for axis in machine.axes:
-        yield from _axis(axis, timeouts_ms[axis.joystick], machine.load)
+        yield from _axis(axis, longest_ms[axis.joystick], machine.load)
         yield ""
     if machine.motion:
         yield from _motion(machine.motion)
@@ -153,7 +155,7 @@ def _joystick(joystick: FirstJoystick) -> Iterator[str]:
 def _switches(machine: FirstMachine) -> Iterator[str]:
     """Yield the section ``switches``: enable switches in another message than their joystick's.
 
-    They get cycle and timeout of the joystick. Without such a switch there is no section.
+    Without such a switch there is no section.
     """
     having = [joystick for joystick in machine.joysticks if joystick.switch]
     if not having:
@@ -161,7 +163,7 @@ def _switches(machine: FirstMachine) -> Iterator[str]:
     yield "switches:"
     for one in having:
         code = None if one.code is None else f"{one.code} # the only value that enables"
-        times = {"timeout_ms": one.timeout_ms, "cycle_ms": one.cycle_ms}
+        times = dict(zip(("timeout_ms", "cycle_ms"), one.switch_ms, strict=True))
         yield f"  {one.name}_enable:"
         yield from _block(4, bus="crane", message=one.switch, signal=one.enable, code=code, **times)
     yield ""

@@ -172,32 +172,43 @@ def _joystick(
         left[:] = [s for s in left if s.name not in gone and s.name.partition("/")[0] != answer]
         return None if answer == NONE else answer
 
-    cycle = message.cycle_time or period_ms(message.name)
+    timeout_ms, cycle_ms = _times_ms(message, before)
     of = other = code = None
     likely = suggest.enabling(left) or (whole[0].name if len(whole) == 1 else None)
     enable = switch("enable switch", likely or ("" if whole else NONE)) if left else None
     if enable is None:
         of, enable, other, code = _switch_elsewhere(message, messages, before)
-    least, most = limits(Joystick, "timeout_ms")
+    own = next((_times_ms(one, before) for one in messages if one.name == of), (0, None))
     reset = switch("switch that resets a trip", suggest.named(left, suggest.RESET))
     off = switch("switch for anti-sway off", suggest.named(left, suggest.ANTI_SWAY_OFF))
     counter = suggest.counter(message)
     joystick = FirstJoystick(
         name=suggest.axis_name(nodes.name_of(message.name) or message.name),
         message=message.name,
-        timeout_ms=int(min(max(FEWEST_CYCLES * cycle, least), most)),
+        timeout_ms=timeout_ms,
         enable=enable,
         reset=reset,
         anti_sway_off=off,
         alive_counter=None if counter in (enable, reset, off) else counter,
-        cycle_ms=None if message.cycle_time else cycle,
+        cycle_ms=cycle_ms,
         switch=of,
+        switch_ms=own,
         node=nodes.supervised(message.name),
         enable_of=other,
         multiplexor=page,
         code=code,
     )
     return joystick, message
+
+
+def _times_ms(message: Message, before: Sequence[FirstJoystick]) -> tuple[int, int | None]:
+    """Return the timeout of a message, and its cycle if the DBC states none, asked once; in ms."""
+    known = {one.switch: one.switch_ms[1] for one in before}
+    known |= {one.message: one.cycle_ms for one in before}
+    cycle = message.cycle_time or known.get(message.name) or period_ms(message.name)
+    least, most = limits(Joystick, "timeout_ms")
+    timeout_ms = int(min(max(FEWEST_CYCLES * cycle, least), most))
+    return timeout_ms, None if message.cycle_time else cycle
 
 
 def _switch_elsewhere(

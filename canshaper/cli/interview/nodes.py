@@ -187,8 +187,8 @@ def uses_of(machine: FirstMachine, messages: Sequence[Message]) -> dict[str, Tim
             uses[message] = cycle_ms or cycles.get(message), timeout_ms
 
     for joystick in machine.joysticks:
-        for message in (joystick.message, joystick.switch):
-            add(message, joystick.timeout_ms, joystick.cycle_ms)
+        add(joystick.message, joystick.timeout_ms, joystick.cycle_ms)
+        add(joystick.switch, *joystick.switch_ms)
     for axis in machine.axes:
         add(axis.valve, axis.timeout_ms)
         if axis.cia408:

@@ -138,20 +138,22 @@ def demo(
     options: DriveOptions = {"parameters": nominal, "crane": crane}
     if plant:
         options["unit"] = plant
-    if seed is None:
+    drawn = None if seed is None else _drawn(deployment, seed, ranges, nominal, plant)
+    if drawn:
+        played, options = drawn.script, drawn.options
+    else:
         played = script_for(one_crane(deployment, crane) if crane else deployment, script)
         if rest is not None:
             released_s = max((stroke.end_s for stroke in played.strokes), default=0.0)
             played = replace(played, duration_s=released_s + rest)
-    else:
-        drawn = _drawn(deployment, seed, ranges, nominal, plant)
-        played, options = drawn.script, drawn.options
     results.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     if crane:
         results.print(f"Crane: {crane} (of {', '.join(several)})")
     results.print(f"Transport: {way.description if way else LOCKSTEP}")
 
     raw, shaped, missed = _driven(deployment, way, played, options, changes or [], export)
+    if drawn:  # residual swing counts from the same time as in the campaign
+        raw, shaped = (replace(one, dwell_s=drawn.dwell_s) for one in (raw, shaped))
     measures = report_dict(
         raw,
         shaped,
@@ -183,10 +185,12 @@ def _drawn(
 ) -> "Setting":
     """Return the drive that a campaign of ``ranges``, else of this file, draws for a seed."""
     from canshaper.campaign.draw import check_same_axes, draw_drive, on_unit
+    from canshaper_sim.recorder import dwell_s
 
     first = loader(ranges)() if ranges else deployment
     check_same_axes(first, deployment)
-    drawn = draw_drive(deployment, seed, first.config.uncertainty, nominal)
+    longest_s = max(map(dwell_s, (first, deployment)))
+    drawn = draw_drive(deployment, seed, first.config.uncertainty, nominal, longest_s)
     return on_unit(drawn, plant, nominal) if plant else drawn
 
 

@@ -267,12 +267,16 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
     """Return the buses of the simulated cranes: the first two channels, else two of udp_multicast.
 
     Raises:
-        UsageError: there is no such channel, or the joysticks might move a real machine on it.
+        UsageError: the interface would not be used, there is no such channel, or the joysticks
+            might move a real machine on it.
     """
     from canshaper.commissioning.doctor.devices import read_link
     from canshaper.design.processes import Transport
     from canshaper.studio.crane import groups
 
+    if interface and interface not in ("udp_multicast", channels and "socketcan"):
+        text = "expected udp_multicast, or socketcan with --channel"
+        raise UsageError(f"--interface: {text}, got {interface!r}")
     if interface == "udp_multicast" and channels:
         return [Transport(interface, one, one) for one in channels[:2]]
     if not channels:
