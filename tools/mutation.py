@@ -71,7 +71,7 @@ def modules(group: str) -> list[str]:
 
 
 def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
-    """Make ``work`` anew: a copy of what the tests need, with the settings of mutmut."""
+    """Empty ``work``; copy to it what the tests need, with the settings of mutmut."""
     shutil.rmtree(work, ignore_errors=True)
     for name in (*COPIED, "tests"):
         ignore = shutil.ignore_patterns("__pycache__")

@@ -168,7 +168,7 @@ MOST_BLOCK = 1 << 24
 
 
 def pcap(file: BufferedReader, place: Place) -> Iterator[TimedFrame]:
-    """Yield the data frames of a pcap or pcapng capture; its first bytes tell which."""
+    """Yield the data frames of a pcap or pcapng capture, by its first bytes."""
     head = file.peek(4)[:4]
     try:
         if head == SECTION:

@@ -57,7 +57,7 @@ def work(
 
     Args:
         what: ``show``, ``run``, ``accept`` or ``skip``.
-        path: the deployment file; a rehearsal works on a copy beside it.
+        path: the deployment file; a rehearsal works on a copy in its directory.
         changes: parameters of the simulated crane, NAME=VALUE; none: those of the last rehearsal.
         step: name of the step; empty to show.
         machine: show the commissioning of the machine; else its rehearsal.

@@ -112,7 +112,7 @@ class InProcessCrane:
 
 
 class HeldHand:
-    """A source of joystick frames; whoever owns it puts the hand's state into ``held``."""
+    """A source of joystick frames; its owner writes the hand's state to ``held``."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.hand, self.held = Hand(deployment), Held()

@@ -18,7 +18,7 @@ from canshaper.studio.stage import RAW
 from canshaper_sim.crane import CraneParameters
 
 RECORDED = "recorded"
-"""Name of the film from a log's own frames, beside those that are replayed."""
+"""Name of the film from a log's own frames; the others are replays."""
 QUIET_S = 1.0
 """A gap between ticks or frames of a log that is longer, s, is left out of the pictures."""
 
@@ -84,7 +84,7 @@ def play_log(
         channels: channel by bus from the command line.
         window: begin and end of the pictures to keep, s.
         parameters: the simulated crane behind the valve frames of each replay.
-        progress: see ``Progress``; it begins anew with each deployment.
+        progress: see ``Progress``; it restarts with each deployment.
 
     Raises:
         LogError: the log cannot be used, or does not fit one of the deployments.

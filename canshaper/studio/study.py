@@ -69,8 +69,8 @@ def read_key(path: Path) -> dict[str, Any]:
         UsageError: the file cannot be read, or has not these in JSON in base64.
     """
     try:
-        found = json.loads(b64decode(path.read_bytes()))
-        return {name: found[name] for name in ("settings", "task", "letters", "seed")}
+        key = json.loads(b64decode(path.read_bytes()))
+        return {name: key[name] for name in ("settings", "task", "letters", "seed")}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UsageError(f"{path}: expected the key of a study: {error}") from None
 

@@ -77,7 +77,7 @@ class RealJoysticks(HeldHand):
         grip: button that grips, as MESSAGE.SIGNAL; None for that of the page.
 
     Attributes:
-        gripped: the button was pressed; whoever reads it sets it to False.
+        gripped: the button was pressed; its reader sets it to False.
 
     Raises:
         BusError: a bus cannot be opened.

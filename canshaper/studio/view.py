@@ -127,14 +127,7 @@ class CraneView:
         sway_deg: tuple[float, float],
         now_s: float,
     ) -> None:
-        """Take values of a simulated crane that is on no bus, so they do not count as measured.
-
-        Args:
-            pose: slewed angle in degrees, radius and height in m.
-            joints: lift and knuckle in degrees, extension in m; None for a crane without them.
-            sway_deg: sway across and along the boom, degrees.
-            now_s: time, s.
-        """
+        """Take (slew, radius, height), joints, sway of a crane on no bus: degrees, m; unmeasured."""
         self.simulated = True
         self.pose, self.joints = pose, joints
         self._sway_at(sway_deg, now_s)

@@ -121,8 +121,8 @@ def test_what_is_made_of_a_log_is_none(tmp_path: Path) -> None:
     others = ["notes.txt", "drive.log.png", "drive.log.bak", "stop.blackbox.part", "old.zip.part"]
     for name in (*logs, *others, "bundle.zip"):
         (tmp_path / name).touch()
-    found = [path.relative_to(tmp_path).as_posix() for _, path in logs_below(tmp_path)]
-    assert found == logs
+    names = [path.relative_to(tmp_path).as_posix() for _, path in logs_below(tmp_path)]
+    assert names == logs
     assert ("north", tmp_path / "north" / "drive.log") in logs_below(tmp_path)
     with_bundles = [path.name for machine, path in logs_below(tmp_path, ".zip") if machine == "."]
     assert with_bundles == ["bundle.zip", *logs[1:]]

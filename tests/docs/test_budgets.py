@@ -63,7 +63,10 @@ BUDGET = {
 LINES = {
     "canshaper/gate": (2_250, "read in a day by someone who has never seen it"),
     "canshaper/shaping": (5_000, "the method: filters, axis, motion, ends, observer of the sway"),
-    "canshaper": (67_300, "a new ability takes the room of an old one; docstrings tell every case"),
+    "canshaper": (
+        67_300,
+        "a new ability takes the room of an old one; docstrings state every case",
+    ),
     "tests": (100_600, "one level for each behaviour"),
 }
 # Files, but for the empty ones of a package; 60 to 300 lines are one subject.

@@ -55,7 +55,7 @@ def commands() -> Iterator[str]:
 
 
 def stage() -> None:
-    """Make out/pages anew: links to the sources at their places, and generated pages."""
+    """Write out/pages, emptied first: links to the sources at their places, and generated pages."""
     shutil.rmtree(PAGES, ignore_errors=True)
     for name in SOURCES:
         place = PAGES / name

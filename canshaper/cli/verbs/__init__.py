@@ -1,1 +1,1 @@
-"""One module for each verb, found by its name: the function of the same name is the command."""
+"""One module for each verb; its function of the same name is the command."""
