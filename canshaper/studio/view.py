@@ -127,7 +127,7 @@ class CraneView:
         sway_deg: tuple[float, float],
         now_s: float,
     ) -> None:
-        """Take (slew, radius, height), joints, sway of a crane on no bus: degrees, m; unmeasured."""
+        """Take pose (slew, radius, height), joints, sway; degrees, m. They count as unmeasured."""
         self.simulated = True
         self.pose, self.joints = pose, joints
         self._sway_at(sway_deg, now_s)
