@@ -230,6 +230,8 @@ def _drive_line(report: Mapping[str, Any]) -> Text:
     line = Text("Missed deadlines: ")
     line.append(NOTHING if missed is None else str(missed), style="bold red" if missed else "bold")
     line.append(f"   transport: {report['transport']}   drive: {report['duration_s']:.1f} s")
+    if missed:
+        line.append("\nA busy machine disturbed the drives; demo --lockstep needs no clock.")
     return line
 
 

@@ -95,7 +95,9 @@ def test_missed_deadlines_and_transport(report: dict[str, Any]) -> None:
     text = printed(report)
     assert "Missed deadlines: 0" in text
     assert "udp_multicast" in text
+    assert "busy" not in text
     assert "Missed deadlines: -" in printed(report | {"missed_deadlines": None})
+    assert "A busy machine disturbed" in printed(report | {"missed_deadlines": 3})
 
 
 def test_a_worse_swing_reads_as_an_increase(report: dict[str, Any]) -> None:
